@@ -112,7 +112,10 @@ def on_a_surface() -> Floats:
     """The method's own distance, sharpened in three ways."""
     field = sh.SignedHeatSolver(SURFACE).distance([ring(SURFACE, 0, 0.9, 0.2, 0.1), SURFACE.points_at(3)])
     return values(
-        field, sh.sharpen(field), sh.sharpen(field, method=sh.Convex()), sh.sharpen(field, method=sh.Geodesic())
+        field,
+        sh.sharpen(field),
+        sh.sharpen(field, method=sh.methods.Convex()),
+        sh.sharpen(field, method=sh.methods.Geodesic()),
     )
 
 
@@ -134,7 +137,7 @@ def on_a_grid() -> Floats:
     """The same on a grid, and held softly."""
     broken = samples.without_faces(samples.sphere(2), 0.2, 0)
     field = sh.SignedHeatSolver(sh.Grid.around(broken, 16)).distance(broken)
-    soft = sh.SignedHeatSolver(sh.Grid.around(broken, 12)).distance(broken, constraint=sh.Soft(10.0))
+    soft = sh.SignedHeatSolver(sh.Grid.around(broken, 12)).distance(broken, constraint=sh.constraints.Soft(10.0))
     return values(field, sh.sharpen(field), soft)
 
 

@@ -74,7 +74,7 @@ def compare(name: str, mesh: sh.TriangleMesh, corners: np.ndarray, diffusion: fl
     source = mesh.level_set(exact, 0.0)
     plain, seconds = timed(lambda: sh.SignedHeatSolver(mesh, diffusion).distance(source), 3)
     sharp, own = timed(lambda: sh.sharpen(plain), 3)
-    convex, slow = timed(lambda: sh.sharpen(plain, method=sh.Convex()))
+    convex, slow = timed(lambda: sh.sharpen(plain, method=sh.methods.Convex()))
     fine, refined = timed(lambda: sh.SignedHeatSolver(mesh, diffusion, intrinsic=True).distance(source))
     cells = [(plain, seconds), (sharp, own), (convex, slow), (fine, refined)]
     texts = [f"{off(phi.values, exact)} {spent:5.2f}s" for phi, spent in cells]
@@ -128,7 +128,7 @@ def in_tets() -> None:
         used = np.unique(mesh.tets)
         plain, seconds = timed(lambda: sh.SignedHeatSolver(mesh, diffusion).distance(shape))
         texts = []
-        for method in (sh.Geodesic(), sh.Convex()):
+        for method in (sh.methods.Geodesic(), sh.methods.Convex()):
             phi, spent = timed(lambda method=method: sh.sharpen(plain, method=method))
             slopes = phi.diagnostics.note(SlopeErrors)
             texts.append(f"{off(phi.values[used], exact[used])} {slopes.slope_error_after:6.4f} {spent:6.2f}s")

@@ -90,7 +90,7 @@ def groups_on_tets(n: int) -> Callable[[], object]:
     shape = sh.TriangleMesh(vertices, faces)
     tets = sh.tetrahedralize(shape, resolution=3 * side)
     solver = sh.SignedHeatSolver(tets)
-    return lambda: solver.distance(shape, sh.EachComponent())
+    return lambda: solver.distance(shape, sh.constraints.EachComponent())
 
 
 def open_boxes(n: int) -> Callable[[], object]:

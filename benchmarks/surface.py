@@ -116,19 +116,19 @@ def ours(data, clock, diffusion=1.0) -> dict[str, object]:
     curves = [sh.Curve(data[f"faces{k}"], data[f"barycentric{k}"], closed=True) for k in range(BATCH + 2)]
     vertices, faces = data["vertices"], data["faces"]
     small = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
-    for constraint in (sh.Free(), sh.ZeroSet()):  # load compiled kernels and libraries
+    for constraint in (sh.constraints.Free(), sh.constraints.ZeroSet()):  # load compiled kernels and libraries
         sh.SignedHeatSolver(small).distance(sh.Curve([0, 0], [[0.5, 0.5, 0], [0, 0.5, 0.5]]), constraint)
     before, _ = memory(), clock.lap()
     solver = sh.SignedHeatSolver(sh.TriangleMesh(vertices, faces), diffusion)
-    phi = solver.distance(curves[0], sh.Free()).values
+    phi = solver.distance(curves[0], sh.constraints.Free()).values
     row = {"first": clock.lap(), "phi": phi.tolist()}
-    solver.distance(curves[1], sh.Free())
+    solver.distance(curves[1], sh.constraints.Free())
     row["next"] = clock.lap()
     row["memory"] = peak() - before
     clock.lap()
     solver.distance(curves[1])
     row["next zero set"] = clock.lap()
-    solver.distance_many(curves[2:], sh.Free())
+    solver.distance_many(curves[2:], sh.constraints.Free())
     row["batched"] = clock.lap() / BATCH
     solver.distance_many(curves[2 : 2 + TOGETHER])
     row["batched zero"] = clock.lap() / TOGETHER

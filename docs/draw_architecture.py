@@ -12,7 +12,7 @@ from PIL import Image
 
 FLOORS = [
     ("cli   __main__", "commands", "#f3d9c1"),
-    ("public   results   samples   batches", "public names, many shapes", "#f3d9c1"),
+    ("public   methods   results   samples   batches", "public names, many shapes", "#f3d9c1"),
     ("io   view   torch", "files, pictures, tensors", "#f3d9c1"),
     ("distances   morphology", "signed_distance in one call; offsets, shells", "#f7e6d0"),
     ("curves   solids", "broken curves on surfaces, and broken shapes in space: completed, then exact", "#f7e6d0"),

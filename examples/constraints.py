@@ -2,7 +2,7 @@
 =============================
 
 Two broken circles on a plane, with different radii: φ free at the source, zero on the whole, or one level on each.
-:class:`signedheat.Soft` is between the first two.
+:class:`signedheat.constraints.Soft` is between the first two.
 """
 
 import numpy as np
@@ -16,13 +16,13 @@ arcs = [sh.Polyline(radius * ring[a : a + 9]) for radius in (1.0, 1.6) for a in 
 solver = sh.SignedHeatSolver(sh.Grid((-2.2, -2.2), 0.04, (111, 111)))
 
 figure = view.new_figure(13.5, 4.2)
-for k, constraint in enumerate((sh.Free(), sh.ZeroSet(), sh.EachComponent())):
+for k, constraint in enumerate((sh.constraints.Free(), sh.constraints.ZeroSet(), sh.constraints.EachComponent())):
     phi = solver.distance(arcs, constraint)
     axes = figure.add_subplot(1, 3, k + 1)
     view.draw_plane(phi, axes, arcs)
     axes.set_title(type(constraint).__name__)
 figure.savefig("constraints.png")
-zero = solver.distance(arcs, sh.ZeroSet())
+zero = solver.distance(arcs, sh.constraints.ZeroSet())
 
 # %%
 # Mean of φ on the outer circle, where it is to be zero:

@@ -35,7 +35,7 @@ for radius, length in ((3.5, np.pi / 10), (1.5, -np.pi / 10)):  # outside eastwa
         angle = np.linspace(start, start + length, 12)
         dashes.append(mesh.polyline(radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)))
 
-phi = sh.SignedHeatSolver(mesh, diffusion=4).distance(dashes, sh.Free())
+phi = sh.SignedHeatSolver(mesh, diffusion=4).distance(dashes, sh.constraints.Free())
 
 view.save_surface(phi, "curve_across_polygons.png", dashes)
 

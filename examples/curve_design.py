@@ -20,7 +20,7 @@ angle = np.linspace(0, 2 * np.pi, 241)
 seam = np.stack([0.9 * np.cos(angle), 0.6 * np.sin(angle), 0.5 + 0 * angle], axis=1)
 strokes = [part.polyline(seam[a : a + 20], max_distance=0.5) for a in range(0, 240, 24)]
 
-phi = sh.sharpen(sh.SignedHeatSolver(part).distance(strokes, sh.Free()))
+phi = sh.sharpen(sh.SignedHeatSolver(part).distance(strokes, sh.constraints.Free()))
 stitches = [curve for level in (-0.2, -0.1, 0.1, 0.2) for curve in phi.contour(level)]
 sh.io.write_curves("stitches.obj", stitches, part)
 

@@ -21,7 +21,7 @@ for start in np.arange(0, 2 * np.pi, np.pi / 4):
     arcs.append(np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) * np.sqrt(1 - 0.4**2) + [0, 0, 0.4])
 curves = [cloud.polyline(arc) for arc in arcs]
 
-phi = sh.SignedHeatSolver(cloud).distance(curves, sh.Free())
+phi = sh.SignedHeatSolver(cloud).distance(curves, sh.constraints.Free())
 
 view.save_surface(phi, "curve_on_a_point_cloud.png", curves)
 

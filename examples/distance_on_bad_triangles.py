@@ -35,7 +35,7 @@ def error(field: sh.VertexField) -> float:
 
 
 mesh, curve = sheared_square(600, stretch=25)
-plain = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, sh.Free())
+plain = sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, sh.constraints.Free())
 better = sh.intrinsic_delaunay(mesh, keep=curve, refine=True)
 robust = sh.SignedHeatSolver(better).distance(curve)
 grid = sh.Grid((-1.0, -1.0), 0.01, (201, 201))

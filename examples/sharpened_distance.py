@@ -35,7 +35,11 @@ def star_distance(points: np.ndarray) -> np.ndarray:
 mesh = square(80)
 exact = star_distance(mesh.vertices[:, :2])
 plain = sh.SignedHeatSolver(mesh, diffusion=100).distance(mesh.level_set(exact, 0.0))
-cases = {"heat, t = 100 h²": plain, "convex": sh.sharpen(plain, method=sh.Convex()), "geodesic": sh.sharpen(plain)}
+cases = {
+    "heat, t = 100 h²": plain,
+    "convex": sh.sharpen(plain, method=sh.methods.Convex()),
+    "geodesic": sh.sharpen(plain),
+}
 look, panels = {"view": np.array([0.0, 0.0, 1.0])}, []
 for title, phi in cases.items():
     error = 100 * np.sqrt(np.mean((phi.values - exact) ** 2)) / np.ptp(exact)

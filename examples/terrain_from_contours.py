@@ -16,7 +16,7 @@ heights = [1.0, 2.0, 3.0, 4.0]
 lines = [sh.Polyline(((5 - h) + 0.15 * np.sin(3 * angle))[:, None] * ring, closed=True).reversed() for h in heights]
 
 grid = sh.Grid((-5, -4.2), 0.1, (101, 85))
-phi = sh.SignedHeatSolver(grid).distance(lines, sh.LevelValues(heights))
+phi = sh.SignedHeatSolver(grid).distance(lines, sh.constraints.LevelValues(heights))
 
 figure = view.new_figure(8.0, 5.6)
 axes = figure.add_subplot()

@@ -58,7 +58,7 @@ def triangulation() -> sh.IntrinsicTriangulation:
 def used(domain: object, sources: object, **options: object) -> sh.SignedHeatSolver:
     """A solver after use, with every factor that it keeps."""
     solver = sh.SignedHeatSolver(domain, **options)
-    for constraint in (sh.ZeroSet(), sh.Free()):
+    for constraint in (sh.constraints.ZeroSet(), sh.constraints.Free()):
         solver.distance(sources, constraint)
     return solver
 
@@ -126,17 +126,17 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "curve orientation": lambda: sh.curve_orientation(RING, BALL),
     "labels": lambda: sh.io.LabelImage(np.arange(8).reshape(2, 2, 2), np.eye(3), np.zeros(3)),
     "sampling": lambda: sh.batches.Sampling(n=10),
-    "batch job": lambda: sh.batches.Job(offsets=(0.1,), constraint=sh.Soft(2.0)),
+    "batch job": lambda: sh.batches.Job(offsets=(0.1,), constraint=sh.constraints.Soft(2.0)),
     "outcome": lambda: sh.batches.Outcome("a", "a.stl", "done", 1.0, outputs=("a.npz",), figures={"faces": 3}),
     "watertight": lambda: sh.batches.Watertight(thickness=0.1),
     "batch": lambda: sh.batches.Batch((sh.batches.Outcome("a", "a.stl", "failed", 1.0),), Path("manifest.jsonl")),
-    "extrapolated": sh.Extrapolated,
-    "free": sh.Free,
-    "zero set": lambda: sh.ZeroSet(hard=True),
-    "each component": sh.EachComponent,
-    "level values": lambda: sh.LevelValues([0.0, 1.0]),
-    "soft": lambda: sh.Soft(10.0),
-    "convex": sh.Convex,
-    "geodesic": sh.Geodesic,
+    "extrapolated": sh.methods.Extrapolated,
+    "free": sh.constraints.Free,
+    "zero set": lambda: sh.constraints.ZeroSet(hard=True),
+    "each component": sh.constraints.EachComponent,
+    "level values": lambda: sh.constraints.LevelValues([0.0, 1.0]),
+    "soft": lambda: sh.constraints.Soft(10.0),
+    "convex": sh.methods.Convex,
+    "geodesic": sh.methods.Geodesic,
     "diagnostics": sh.results.Diagnostics,
 }

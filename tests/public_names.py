@@ -6,9 +6,16 @@ import inspect
 
 import signedheat as sh
 
-ERRORS = [name for name, thing in vars(sh.errors).items() if isinstance(thing, type) and issubclass(thing, Exception)]
 READERS = [name for name in sh.io.__all__ if name.startswith(("load", "read_", "write_", "Label"))]
-MODULES = {"batches": None, "errors": ERRORS, "io": READERS, "morphology": None, "results": None}
+MODULES = {
+    "batches": None,
+    "constraints": None,
+    "errors": None,
+    "io": READERS,
+    "methods": None,
+    "morphology": None,
+    "results": None,
+}
 
 PUBLIC = [(name, getattr(sh, name)) for name in sh.__all__]
 PUBLIC += [

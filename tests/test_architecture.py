@@ -50,7 +50,7 @@ FLOORS = [
     {"io", "torch"},
     {"view"},
     {"batches"},
-    {"", "public", "results", "samples"},
+    {"", "public", "methods", "results", "samples"},
     {"cli", "__main__"},
 ]
 """From the ground up: a module may import what is on its own floor or below. docs/architecture.md shows the same."""
@@ -147,7 +147,8 @@ def test_public_names_are_the_same_whatever_is_imported_first(step):
 import signedheat as sh
 for name in {submodules!r}: import_module(name)
 public = import_module("signedheat.public")
-assert all(getattr(sh, name) is getattr(public, name) for name in (*public.__all__, *public.MODULES))
+assert all(getattr(sh, name) is getattr(public, name) for name in public.__all__)
+assert all(getattr(sh, module.__name__.rpartition(".")[2]) is module for module in public.MODULES)
 print(*dir(sh))"""
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.split() == dir(signedheat)
@@ -158,9 +159,23 @@ def test_looking_at_the_package_shows_its_public_names_and_nothing_else():
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     names, is_function, again = found.stdout.splitlines()
     public = importlib.import_module("signedheat.public")
-    assert set(names.split()) == {*public.__all__, *public.MODULES, "__version__"}
+    modules = {module.__name__.removeprefix("signedheat.") for module in public.MODULES}
+    assert set(names.split()) == {*public.__all__, *modules, "__version__"}
     assert is_function == "True" and again == names
-    assert {"SignedHeatError", "GeometryError", "signed_distance"} <= set(signedheat.__all__)
+    assert {"SignedHeatError", "signed_distance"} <= set(signedheat.__all__)
+    assert len([*public.__all__, *modules]) <= 50
+
+
+def test_public_modules_show_their_public_names_and_nothing_else():
+    for module in importlib.import_module("signedheat.public").MODULES:
+        assert dir(module) == sorted(module.__all__), module.__name__
+        assert all(hasattr(module, name) for name in module.__all__), module.__name__
+
+
+@pytest.mark.parametrize("name", ["GeometryError", "Free", "Convex", "broken_duck"])
+def test_a_name_of_a_public_module_is_said_to_be_there(name):
+    with pytest.raises(AttributeError, match=rf"signedheat\.\w+\.{name}$"):
+        getattr(signedheat, name)
 
 
 @pytest.fixture

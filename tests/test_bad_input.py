@@ -142,8 +142,16 @@ def test_piecewise_distance(arguments, keywords, error):
         case("orient the curves", BALL, BALL.points_at([3]), error=sh.errors.SourceError),
         case("diffusion must be finite", BALL, RING, diffusion=NAN),
         case("is not a constraint", BALL, RING, constraint="zero", error=sh.errors.UnsupportedTypeError),
-        case("is not a constraint", BALL, RING, constraint=sh.ZeroSet, error=sh.errors.UnsupportedTypeError),
-        case("3 level values", BALL, RING, constraint=sh.LevelValues([0, 1, 2]), error=sh.errors.ConstraintError),
+        case(
+            "is not a constraint", BALL, RING, constraint=sh.constraints.ZeroSet, error=sh.errors.UnsupportedTypeError
+        ),
+        case(
+            "3 level values",
+            BALL,
+            RING,
+            constraint=sh.constraints.LevelValues([0, 1, 2]),
+            error=sh.errors.ConstraintError,
+        ),
     ],
 )
 def test_close_curves(arguments, keywords, error):
@@ -239,12 +247,15 @@ ROUND = np.linalg.norm(GRID.points, axis=-1) - 1
         ),
         case("no value anywhere", sh.TetField(BOX, np.full(BOX.n_vertices, NAN)), error=sh.errors.OutsideError),
         case("one sign", sh.TetField(BOX, np.zeros(BOX.n_vertices)), error=sh.errors.OutsideError),
-        case("comes without one", HEIGHT, method=sh.Convex(), error=sh.errors.SourceError),
+        case("comes without one", HEIGHT, method=sh.methods.Convex(), error=sh.errors.SourceError),
         case(
-            "comes without one", sh.TetField(BOX, BOX.vertices[:, 0]), method=sh.Convex(), error=sh.errors.SourceError
+            "comes without one",
+            sh.TetField(BOX, BOX.vertices[:, 0]),
+            method=sh.methods.Convex(),
+            error=sh.errors.SourceError,
         ),
         case("not a method of sharpening", HEIGHT, method="convex", error=sh.errors.UnsupportedTypeError),
-        case("not a method of sharpening", HEIGHT, method=sh.Convex, error=sh.errors.UnsupportedTypeError),
+        case("not a method of sharpening", HEIGHT, method=sh.methods.Convex, error=sh.errors.UnsupportedTypeError),
     ],
 )
 def test_sharpen(arguments, keywords, error):
@@ -254,20 +265,20 @@ def test_sharpen(arguments, keywords, error):
 
 def test_methods_are_for_surfaces_and_tets():
     with refused(sh.errors.UnsupportedTypeError):
-        sh.sharpen(sh.GridField(GRID, ROUND), method=sh.Convex())
+        sh.sharpen(sh.GridField(GRID, ROUND), method=sh.methods.Convex())
 
 
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: sh.Convex(tolerance=NAN),
-        lambda: sh.Convex(tolerance=0),
-        lambda: sh.Convex(max_rounds=0),
-        lambda: sh.Convex(max_rounds=2.5),
-        lambda: sh.Convex(relaxation=2.0),
-        lambda: sh.Geodesic(-1),
-        lambda: sh.Geodesic(NAN),
-        lambda: sh.Geodesic("x"),
+        lambda: sh.methods.Convex(tolerance=NAN),
+        lambda: sh.methods.Convex(tolerance=0),
+        lambda: sh.methods.Convex(max_rounds=0),
+        lambda: sh.methods.Convex(max_rounds=2.5),
+        lambda: sh.methods.Convex(relaxation=2.0),
+        lambda: sh.methods.Geodesic(-1),
+        lambda: sh.methods.Geodesic(NAN),
+        lambda: sh.methods.Geodesic("x"),
     ],
 )
 def test_methods(make):

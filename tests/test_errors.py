@@ -16,7 +16,7 @@ import signedheat as sh
 from signedheat.cli.operands import prefix_errors
 
 TRIANGLE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-KINDS = [kind for kind in vars(sh).values() if isinstance(kind, type) and issubclass(kind, sh.errors.SignedHeatError)]
+KINDS = [kind for kind in vars(sh.errors).values() if isinstance(kind, type) and issubclass(kind, sh.SignedHeatError)]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -72,7 +72,14 @@ def test_a_broken_source_is_nearly_as_good(ball):
 
 
 @pytest.mark.parametrize(
-    "constraint", [sh.Free(), sh.ZeroSet(), sh.ZeroSet(hard=True), sh.EachComponent(), sh.Soft(20.0)]
+    "constraint",
+    [
+        sh.constraints.Free(),
+        sh.constraints.ZeroSet(),
+        sh.constraints.ZeroSet(hard=True),
+        sh.constraints.EachComponent(),
+        sh.constraints.Soft(20.0),
+    ],
 )
 def test_constraints_keep_a_source_where_it_is(ball, constraint):
     assert cases.error(ball.distance(ball.source, constraint), ball.exact()) < 1e-2
@@ -82,7 +89,7 @@ def test_levels_may_be_given(ball):
     heights = (0.0, 0.5)
     sources = [ball.kind.source(ball.domain, height)[0] for height in heights]
     levels = ball.kind.levels(*heights)
-    phi = ball.distance(sources, sh.LevelValues(levels))
+    phi = ball.distance(sources, sh.constraints.LevelValues(levels))
     assert cases.error(phi, ball.exact(0.0)) < 1e-2
 
 
@@ -176,7 +183,7 @@ def test_a_vertex_that_does_not_exist_is_refused(ball):
 
 def test_level_values_must_be_as_many_as_the_sources(ball):
     with refused(sh.errors.ConstraintError):
-        ball.distance(ball.source, sh.LevelValues([0.0, 1.0, 2.0]))
+        ball.distance(ball.source, sh.constraints.LevelValues([0.0, 1.0, 2.0]))
 
 
 def test_isolated_points_and_unoriented_curves_have_unsigned_distance_on_surfaces(ball):
@@ -287,7 +294,7 @@ def test_ugly_but_valid_domains_work(make):
         line = domain.polyline([[-0.9, 0.33, 0], [0.9, 0.33, 0]], max_distance=1.0)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sh.errors.UnreachedWarning)
-        phi = sh.SignedHeatSolver(domain).distance(line, sh.Free()).values.ravel()
+        phi = sh.SignedHeatSolver(domain).distance(line, sh.constraints.Free()).values.ravel()
     place = positions(domain)
     plate = (np.abs(place) < 0.8).all(axis=1) & (np.abs(place[:, 2]) < 0.2)
     assert np.isfinite(phi[plate]).mean() > 0.98

@@ -100,8 +100,8 @@ def test_sizes_within_give_the_same_distances(scale):
         lambda x: BALL.polyline(x),
         lambda x: BALL.level_set(x),
         lambda x: BALL.region_boundary(x),
-        lambda x: sh.LevelValues(x),
-        lambda x: sh.Soft(-1.0 if x is None else x),
+        lambda x: sh.constraints.LevelValues(x),
+        lambda x: sh.constraints.Soft(-1.0 if x is None else x),
         lambda x: sh.tetrahedralize(BALL, resolution=x),
         lambda x: sh.GridField(x, np.zeros((3, 3))),
         lambda x: sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), x),
@@ -157,11 +157,14 @@ def test_weights_of_soft_constraints_have_limits_on_both_ends():
     mesh = sphere(2)
     ring = mesh.level_set(mesh.vertices[:, 2], 0.15)
     solver = sh.SignedHeatSolver(mesh)
-    free, held = solver.distance(ring, sh.Free()).values, solver.distance(ring, sh.ZeroSet(hard=True)).values
+    free, held = (
+        solver.distance(ring, sh.constraints.Free()).values,
+        solver.distance(ring, sh.constraints.ZeroSet(hard=True)).values,
+    )
     for weak in (1e-300, 1e-12):
-        np.testing.assert_allclose(solver.distance(ring, sh.Soft(weak)).values, free, atol=1e-8)
+        np.testing.assert_allclose(solver.distance(ring, sh.constraints.Soft(weak)).values, free, atol=1e-8)
     for strong in (1e12, 1e300):
-        np.testing.assert_allclose(solver.distance(ring, sh.Soft(strong)).values, held, atol=1e-5)
+        np.testing.assert_allclose(solver.distance(ring, sh.constraints.Soft(strong)).values, held, atol=1e-5)
 
 
 @pytest.mark.parametrize("flatness", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0.0])
@@ -194,12 +197,12 @@ def test_intrinsic_triangulations_lose_no_more_area_than_cancels_in_heron_s_form
 def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
     """Sources on all sides cancel: φ is rounding alone, and tells no scale."""
     mesh = sh.TriangleMesh(scale * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [-1, 0, 0], [-1, -1, 0.3]]), BOW_TIE)
-    for constraint in (None, sh.Free()):
+    for constraint in (None, sh.constraints.Free()):
         field = sh.SignedHeatSolver(mesh).distance(mesh.points_at([0, 1, 2, 3, 4]), constraint)
         assert np.abs(field.values).max() < scale
         tiny = sh.VertexField(mesh, np.array([0, 1, -1, 2, -2]) * 1e-95 * scale, source=field.source)
         for made in (field, tiny):
-            assert np.abs(sh.sharpen(made, method=sh.Convex()).values).max() < 10 * scale
+            assert np.abs(sh.sharpen(made, method=sh.methods.Convex()).values).max() < 10 * scale
 
 
 @pytest.mark.parametrize("origin", [1e16, -1e16, 1e20])
@@ -251,7 +254,7 @@ def test_convex_sharpening_on_tets_holds_sources_of_any_size(area):
     middle = mesh.vertices.mean(axis=0) + np.array([0.01, 0.02, 0.03])
     patch = sh.TriangleMesh(middle + size * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.1]]), [[0, 1, 2]])
     phi = sh.SignedHeatSolver(mesh).distance(patch)
-    sharp = sh.sharpen(phi, method=sh.Convex(max_rounds=20))
+    sharp = sh.sharpen(phi, method=sh.methods.Convex(max_rounds=20))
     assert np.abs(sharp.values).max() < 3 * np.linalg.norm(np.ptp(mesh.vertices, axis=0))
 
 

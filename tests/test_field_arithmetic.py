@@ -71,7 +71,7 @@ def test_values_beyond_the_nodes_change_too():
     assert (2 * phi + 1)(far)[0] == pytest.approx(2 * phi.interpolate(far)[0] + 1, rel=1e-6)
 
 
-@pytest.mark.parametrize("other", ["a", None, [1.0], sh.ZeroSet()])
+@pytest.mark.parametrize("other", ["a", None, [1.0], sh.constraints.ZeroSet()])
 def test_what_is_no_number_is_refused(other):
     for operate in (lambda a, b: a + b, lambda a, b: a * b, lambda a, b: b - a, lambda a, b: a - b):
         with pytest.raises(TypeError):

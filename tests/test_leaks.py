@@ -36,7 +36,7 @@ def held():
 def once(k):
     mesh = sh.TriangleMesh(ball.vertices * (1 + k), ball.faces)
     solver = sh.SignedHeatSolver(mesh)
-    for constraint in (None, sh.Free()):
+    for constraint in (None, sh.constraints.Free()):
         field = solver.distance(ring, constraint)
     if k % 4 == 0:
         sh.sharpen(field)
@@ -102,7 +102,7 @@ def test_factors_are_freed_with_their_solver(monkeypatch):
     ball = samples.sphere(1)
     solver = sh.SignedHeatSolver(ball)
     for source in (ball.level_set(ball.vertices[:, 2], 0.1), ball.points_at(0)):
-        for constraint in (None, sh.Free(), sh.Soft(1.0)):
+        for constraint in (None, sh.constraints.Free(), sh.constraints.Soft(1.0)):
             assert np.isfinite(solver.distance(source, constraint).values).all()
     assert 3 <= sum(reference() is not None for reference in made) < len(made)  # the last of each kind is kept
     del solver

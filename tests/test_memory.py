@@ -229,7 +229,7 @@ def test_rows_are_imposed_exactly_only_where_there_is_memory_for_it(monkeypatch)
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 60 * grid.n_nodes)
     sh.SignedHeatSolver(grid).distance(BALL)
     with refused(sh.errors.MemoryLimitError) as caught:
-        sh.SignedHeatSolver(grid).distance(BALL, sh.ZeroSet(hard=True))
+        sh.SignedHeatSolver(grid).distance(BALL, sh.constraints.ZeroSet(hard=True))
     assert "hard=True" in caught.value.remedy
 
 

@@ -38,7 +38,7 @@ def test_arrays_that_are_no_shape_say_what_is_wrong(name, call):
 
 @pytest.mark.parametrize("lines", [1, 2])
 def test_lines_in_the_plane_are_no_solid(lines):
-    with refused(sh.SourceError) as caught:
+    with refused(sh.errors.SourceError) as caught:
         sh.complete([sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True)] * lines)
     assert "lines in the plane" in str(caught.value)
 
@@ -48,27 +48,27 @@ def test_lines_in_the_plane_are_no_solid(lines):
     lambda voxels: sh.morphology.dilate(voxels, 0.1), sh.SignedHeatSolver(sh.Grid.around(BALL.bounds, 8)).distance,
 ])  # fmt: skip
 def test_voxels_are_measured_to_by_their_smooth_surface(take):
-    with refused(sh.SourceError) as caught:
+    with refused(sh.errors.SourceError) as caught:
         take(sh.DigitalSurface(np.pad(np.ones((2, 2, 2), bool), 1)))
     assert "smooth_surface" in str(caught.value)
 
 
 @pytest.mark.parametrize("source", [BALL, sh.complete(BALL), (V, F)], ids=["mesh", "solid", "pair"])
 def test_grids_of_another_dimension(source):
-    with refused(sh.SourceError, element="source 0") as caught:
+    with refused(sh.errors.SourceError, element="source 0") as caught:
         sh.signed_distance(source, sh.Grid((0, 0), 1, (3, 3)))
     assert "2" in caught.value.cause and "3" in caught.value.cause
     line = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
-    with refused(sh.SourceError, element="source 0"):
+    with refused(sh.errors.SourceError, element="source 0"):
         sh.signed_distance(line, sh.Grid((0, 0, 0), 1, (3, 3, 3)))
 
 
 def test_thin_parts_need_smaller_cells():
     plate = sh.complete(box((-10, -10, -0.1), (10, 10, 0.1)))
-    with pytest.raises(sh.OutsideError) as caught:
+    with pytest.raises(sh.errors.OutsideError) as caught:
         plate.field(grid=sh.Grid((-14, -14, -4.5), 1.0, (29, 29, 10))).contour()
     assert "smaller cells" in caught.value.remedy
-    with pytest.raises(sh.OutsideError) as caught:
+    with pytest.raises(sh.errors.OutsideError) as caught:
         sh.complete(BALL).field(16).contour(50.0)
     assert "larger grid" in caught.value.remedy
 
@@ -76,7 +76,7 @@ def test_thin_parts_need_smaller_cells():
 @pytest.mark.parametrize("options", [{}, {"keep_outside": True}])
 def test_a_shell_deeper_than_the_part_says_that_nothing_is_hollow(options):
     cube = box((0, 0, 0), (2, 2, 2))
-    with pytest.warns(sh.InexactWarning, match="hollow"):
+    with pytest.warns(sh.errors.InexactWarning, match="hollow"):
         full = sh.morphology.shell(cube, -1.5, 0.0, resolution=32, **options)
     assert full.to_trimesh().volume == pytest.approx(8, rel=0.06)  # contours cut edges off
     hollow = sh.morphology.shell(cube, -0.5, 0.0, resolution=32, **options)

@@ -137,7 +137,7 @@ def test_some_faces_of_a_part_are_thickened():
         np.testing.assert_allclose(slab.bounds, [[-1, -1, 1], [1, 1, 1.2]], atol=1e-3)
         assert enclosed_volume(slab) == pytest.approx(0.8, rel=1e-3)
     assert (sh.complete(part) | sh.complete(slab)).volume == pytest.approx(8.8, rel=1e-4)
-    with refused(sh.SourceError, "faces"):
+    with refused(sh.errors.SourceError, "faces"):
         sh.morphology.thicken(part, 0.2, faces=[99])
 
 
@@ -157,7 +157,7 @@ def test_the_rims_of_a_tube_are_flat_rings():
 
 def test_hollowing_twice_changes_nothing():
     once = sh.morphology.shell(BALL, -0.2, 0.0, resolution=32, keep_outside=True)
-    with pytest.warns(sh.InexactWarning, match="not hollowed"):
+    with pytest.warns(sh.errors.InexactWarning, match="not hollowed"):
         twice = sh.morphology.shell(once, -0.2, 0.0, resolution=32, keep_outside=True)
     assert enclosed_volume(twice) == pytest.approx(enclosed_volume(once), rel=1e-9)
 

@@ -14,7 +14,7 @@ from signedheat import samples
 def all_notes():
     ball = samples.sphere(2)
     damaged = samples.with_flipped_faces(samples.without_patches(samples.sphere(3), 3, 0.4), 0.2, seed=1)
-    with pytest.warns(sh.InexactWarning):
+    with pytest.warns(sh.errors.InexactWarning):
         pieces = sh.signed_distance([ball.path([0, 1])], ball)
     line = sh.Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
     return [

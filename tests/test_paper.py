@@ -74,7 +74,7 @@ def test_page_has_the_numbers_and_the_words_of_its_script(reproduction):
 
 
 @pytest.mark.parametrize("number", ["8", "10", "17"])
-@pytest.mark.filterwarnings("ignore::signedheat.InexactWarning")
+@pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")
 def test_page_is_no_older_than_what_it_measures(reproduction, number, tmp_path, monkeypatch):
     """What is quick, boundaries, constraints and broken curves, is measured again, to a tenth, but not drawn."""
     monkeypatch.setattr("reproduction.surfaces.draw_surface", lambda *_, **__: None)

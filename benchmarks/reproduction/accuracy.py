@@ -46,11 +46,14 @@ def whole_and_broken(page: Page) -> None:
         broken = solver.distance(shapes.pieces(mesh, heights, 0.5, 3)).values
         page.add(
             vertices=mesh.n_vertices,
-            **{"whole ε %": baselines.error(solver.distance(whole, sh.Free()).values, exact)},
+            **{"whole ε %": baselines.error(solver.distance(whole, sh.constraints.Free()).values, exact)},
             **{"half gone ε %": baselines.error(broken, exact)},
         )
     left = shapes.pieces(mesh, heights, 0.5, 3)
-    shown = {"whole": (solver.distance(whole, sh.Free()), whole), "half gone": (solver.distance(left), left)}
+    shown = {
+        "whole": (solver.distance(whole, sh.constraints.Free()), whole),
+        "half gone": (solver.distance(left), left),
+    }
     page.draw(row_of_surfaces(shown))
 
 
@@ -68,7 +71,7 @@ def row_of_surfaces(
 
 @figure("15", "Sharpening")
 def sharpening(page: Page) -> None:
-    """Sharpened after t = 100 h². The paper maximises a convex objective (Eq. 18; here `sh.Convex()`); our default
+    """Sharpened after t = 100 h². The paper maximises a convex objective (Eq. 18; `sh.methods.Convex()`). Our default
     measures straight lines from the zero set.
     """
     mesh = shapes.flat_disk(6000)
@@ -78,7 +81,7 @@ def sharpening(page: Page) -> None:
     field, first = seconds(lambda: solver.distance(curve))
     fields = {"before": (field, first)}
     fields["after, straight lines"] = seconds(lambda: sh.sharpen(field))
-    fields["after, convex"] = seconds(lambda: sh.sharpen(field, method=sh.Convex()))
+    fields["after, convex"] = seconds(lambda: sh.sharpen(field, method=sh.methods.Convex()))
     picture = new_figure(15, 4.4)
     for k, (name, (result, took)) in enumerate(fields.items()):
         page.add(field=name, **{"ε %": baselines.error(result.values, exact), "seconds": took})
@@ -139,7 +142,9 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
     }
     if slow_ones:
         ways["convex"] = lambda: (
-            sh.sharpen(sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves), method=sh.Convex()).values
+            sh.sharpen(
+                sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves), method=sh.methods.Convex()
+            ).values
         )
         ways["fast marching"] = lambda: sign * baselines.fast_marching(mesh, start)
     cells = {}

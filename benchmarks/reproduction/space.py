@@ -59,8 +59,8 @@ def completed_surfaces(page: Page) -> None:
     winding = baselines.solid_winding(grid.points.reshape(-1, 3), broken).reshape(grid.shape)
     fields = {
         "GWN, level ½": sh.GridField(grid, 0.5 - winding),
-        "GSD, interpolating": sh.SignedHeatSolver(grid).distance(broken, sh.ZeroSet()),
-        "GSD, approximating": sh.SignedHeatSolver(grid).distance(broken, sh.Free()),
+        "GSD, interpolating": sh.SignedHeatSolver(grid).distance(broken, sh.constraints.ZeroSet()),
+        "GSD, approximating": sh.SignedHeatSolver(grid).distance(broken, sh.constraints.Free()),
     }
     picture = new_figure(15, 4.2)
     draw_shape(broken, picture.add_subplot(1, 4, 1))

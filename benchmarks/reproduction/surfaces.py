@@ -32,7 +32,7 @@ def no_bias_at_the_boundary(page: Page) -> None:
     curve = shapes.placed(mesh, line)
     exact = np.linalg.norm(mesh.vertices[:, :2] - [0.8, 0], axis=1) - 0.7
     sign = np.sign(exact)
-    signed = sh.SignedHeatSolver(mesh, diffusion=100.0, intrinsic=False).distance(curve, sh.Free())
+    signed = sh.SignedHeatSolver(mesh, diffusion=100.0, intrinsic=False).distance(curve, sh.constraints.Free())
     unsigned = baselines.unsigned_heat(mesh, [curve], diffusion=100.0)
     fields = {"unsigned heat method × sign": sign * unsigned, "signed heat method": signed.values}
     rim = np.linalg.norm(mesh.vertices[:, :2], axis=1) > 1.7
@@ -81,7 +81,11 @@ def level_set_constraints(page: Page) -> None:
     curves = [shapes.placed(mesh, circle(radius)) for radius in (0.6, 1.0, 1.5)]
     solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     picture = new_figure(15, 4.4)
-    constraints = {"none": sh.Free(), "zero on all": sh.ZeroSet(), "constant on each": sh.EachComponent()}
+    constraints = {
+        "none": sh.constraints.Free(),
+        "zero on all": sh.constraints.ZeroSet(),
+        "constant on each": sh.constraints.EachComponent(),
+    }
     for k, (name, constraint) in enumerate(constraints.items()):
         field = solver.distance(curves, constraint)
         spread = max(float(np.ptp(field(curve))) for curve in curves)
@@ -104,8 +108,12 @@ def soft_constraints(page: Page) -> None:
     curve = shapes.placed(mesh, eight)
     solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     spacing = shapes.mean_edge(mesh)
-    constraints = {"none": sh.Free(), "exact": sh.ZeroSet(hard=True), "default": sh.ZeroSet()}
-    constraints["soft"] = sh.Soft(1 / spacing)
+    constraints = {
+        "none": sh.constraints.Free(),
+        "exact": sh.constraints.ZeroSet(hard=True),
+        "default": sh.constraints.ZeroSet(),
+    }
+    constraints["soft"] = sh.constraints.Soft(1 / spacing)
     picture = new_figure(20, 4.4)
     for k, (name, constraint) in enumerate(constraints.items()):
         field = solver.distance(curve, constraint)
@@ -132,7 +140,7 @@ def curves_that_bound_nothing(page: Page) -> None:
     }
     picture = new_figure(15, 4.6)
     for k, (name, (mesh, curves)) in enumerate(cases.items()):
-        continuous = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves, sh.Free())
+        continuous = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves, sh.constraints.Free())
         field = sh.piecewise_distance(mesh, curves)
         slopes = [
             float(np.mean(np.abs(1 - np.linalg.norm(gradient, axis=1))))
@@ -229,8 +237,8 @@ def intrinsic_triangulations(page: Page) -> None:
             mesh, curve = sheared_square(1200, stretch, seed)
             exact = np.linalg.norm(mesh.vertices[:, :2], axis=1) - 0.55
             fields = {
-                "as it is": sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()),
-                "refined": sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(curve, sh.Free()),
+                "as it is": sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.constraints.Free()),
+                "refined": sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(curve, sh.constraints.Free()),
             }
             for name, field in fields.items():
                 errors[f"{name} ε %"].append(baselines.error(field.restrict().values, exact))

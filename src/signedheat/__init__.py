@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import batches as batches
+    from . import constraints as constraints
     from . import errors as errors
     from . import io as io
+    from . import methods as methods
     from . import morphology as morphology
     from . import results as results
     from . import samples as samples
@@ -25,12 +27,14 @@ __version__ = "0.2.0"
 def __getattr__(name: str) -> Any:
     public = import_module(f"{__name__}.public")
     globals().update({name: getattr(public, name) for name in [*public.__all__, "__all__"]})
-    try:
+    if name in globals():
         return globals()[name]
-    except KeyError:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}", name=name, obj=public) from None
+    found = [f"{module.__name__}.{name}" for module in public.MODULES if name in module.__all__]
+    where = f": it is {found[0]}" if found else ""
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}{where}", name=name, obj=public)
 
 
 def __dir__() -> list[str]:
     public = import_module(f"{__name__}.public")
-    return sorted([*public.__all__, *public.MODULES, "__version__"])
+    modules = (module.__name__.rpartition(".")[2] for module in public.MODULES)
+    return sorted([*public.__all__, *modules, "__version__"])

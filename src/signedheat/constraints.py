@@ -13,6 +13,8 @@ from .discretization import Integration, Levels, SourceTerm
 from .errors import ConstraintError
 from .validation import LARGEST_COORDINATE, numbers, positive_number
 
+__all__ = ["Constraint", "EachComponent", "Free", "LevelValues", "Soft", "ZeroSet"]
+
 
 @runtime_checkable
 class Constraint(Protocol):
@@ -39,7 +41,7 @@ class Constraint(Protocol):
         --------
         >>> import signedheat as sh
         >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.Soft(1.0))([0.5, 0.5]).item(), 2)
+        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.constraints.Soft(1.0))([0.5, 0.5]).item(), 2)
         0.5
         """
 

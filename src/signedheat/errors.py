@@ -7,6 +7,12 @@ import os
 import warnings
 from typing import TypeVar
 
+__all__ = [
+    "CancellingNormalsError", "ConstraintError", "FactorizationError", "FileFormatError", "GeometryError",
+    "InexactWarning", "MemoryLimitError", "MissingPackageError", "OutsideError", "SignedHeatError", "SourceError",
+    "UnreachedWarning", "UnsupportedTypeError",
+]  # fmt: skip
+
 
 def printable(text: str) -> str:
     """Escape control characters, so that names and contents of files cannot control a terminal.

@@ -15,6 +15,11 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .transforms import joined_triangles
 from .validation import whole_number
 
+__all__ = [
+    "broken_duck", "duck", "oriented_points", "soup", "sphere", "torus", "union", "with_duplicate_faces",
+    "with_flipped_faces", "with_noise", "without_faces", "without_patches",
+]  # fmt: skip
+
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
     """Make a sphere: an icosahedron whose faces are split into four `subdivisions` times.

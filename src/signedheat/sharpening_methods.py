@@ -183,7 +183,7 @@ class Method(Protocol):
         >>> import signedheat as sh
         >>> ball = sh.samples.sphere(2)
         >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
-        >>> [len(sh.sharpen(phi, method=method).values) for method in (sh.Geodesic(), sh.Convex())]
+        >>> [len(sh.sharpen(phi, method=method).values) for method in (sh.methods.Geodesic(), sh.methods.Convex())]
         [162, 162]
         """
 

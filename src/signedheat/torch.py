@@ -16,6 +16,8 @@ from .solids.solid import Solid
 if TYPE_CHECKING:
     from torch import Tensor
 
+__all__ = ["distance"]
+
 torch: Any = lazy_module("torch", "tensors")
 
 

@@ -413,10 +413,10 @@ def test_figures_that_the_manifest_cannot_hold_fail_alone(tmp_path, files):
 def test_constraints_of_plain_fields_give_them_in_batches_too(tmp_path):
     source = tmp_path / "ball.ply"
     samples.sphere(2).save(source)
-    job = sh.batches.Job(volume=".npz", resolution=12, constraint=sh.EachComponent())
+    job = sh.batches.Job(volume=".npz", resolution=12, constraint=sh.constraints.EachComponent())
     job(source, tmp_path / "made")
     grid = sh.load_field(tmp_path / "made.npz").grid
-    plain = sh.SignedHeatSolver(grid).distance(sh.read(source), sh.EachComponent())
+    plain = sh.SignedHeatSolver(grid).distance(sh.read(source), sh.constraints.EachComponent())
     assert np.array_equal(sh.load_field(tmp_path / "made.npz").values, plain.values)
     with pytest.raises(sh.SignedHeatError, match="a band would need"):
-        sh.batches.Job(volume=".npz", band=0.1, constraint=sh.EachComponent())
+        sh.batches.Job(volume=".npz", band=0.1, constraint=sh.constraints.EachComponent())

@@ -31,7 +31,7 @@ def test_a_field_comes_out(files, capsys):
     assert "642 vertices" in capsys.readouterr().out
     mesh = sh.read(files / "ball.ply")
     curves = sh.io.read_curves(files / "curves.json", mesh)
-    phi = sh.SignedHeatSolver(mesh, 2.0).distance(curves, sh.EachComponent())
+    phi = sh.SignedHeatSolver(mesh, 2.0).distance(curves, sh.constraints.EachComponent())
     assert (np.load(out)["values"] == phi.values).all()
 
 

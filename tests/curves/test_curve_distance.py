@@ -227,7 +227,7 @@ def test_levels_of_their_own_are_refused():
     mesh = sphere(2)
     curve = mesh.level_set(mesh.vertices[:, 2], 0.3)
     with pytest.raises(sh.errors.ConstraintError) as caught:
-        sh.signed_distance(curve, mesh, constraint=sh.EachComponent())
+        sh.signed_distance(curve, mesh, constraint=sh.constraints.EachComponent())
     assert caught.value.remedy
 
 

@@ -69,7 +69,7 @@ def test_closing_leaves_it_out_too(mesh, pieces):
 
 def test_strokes_of_which_none_bounds_anything_are_a_guess_and_stay(mesh):
     strokes = [mesh.polyline([[x, -0.2, 0], [x, 0.2, 0]]) for x in (-0.6, 0.5)]
-    with pytest.warns(sh.InexactWarning, match="bound nothing"):
+    with pytest.warns(sh.errors.InexactWarning, match="bound nothing"):
         phi = sh.signed_distance(strokes, mesh)
     assert taken(phi)[1] == []
     for curve in strokes:

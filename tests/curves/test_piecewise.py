@@ -99,7 +99,7 @@ def test_bounding_curve_equals_plain_distance():
     phi = sh.piecewise_distance(mesh, circle)
     notes = phi.diagnostics.note(Jumps)
     assert notes.continuous and phi.cut == [] and notes.cut_length == 0
-    plain = sh.SignedHeatSolver(mesh).distance(circle, sh.Free())
+    plain = sh.SignedHeatSolver(mesh).distance(circle, sh.constraints.Free())
     split = phi.split()
     assert split.domain.n_vertices == mesh.n_vertices
     at_vertices = np.empty(mesh.n_vertices)
@@ -266,7 +266,7 @@ def test_smoothing_takes_small_jumps_away_and_leaves_the_cut():
 def test_smooth_is_step_three():
     mesh = sphere(3)
     circle = mesh.level_set(mesh.vertices[:, 2], 0.3)
-    plain = sh.SignedHeatSolver(mesh, intrinsic=False, diffusion=1.0).distance(circle, sh.Free()).values
+    plain = sh.SignedHeatSolver(mesh, intrinsic=False, diffusion=1.0).distance(circle, sh.constraints.Free()).values
     smooth = sh.piecewise_distance(mesh, circle, intrinsic=False).split()
     assert np.ptp(smooth.values[smooth.domain.faces] - plain[mesh.faces]) < 1e-4
 
@@ -411,7 +411,7 @@ def test_curves_that_bound_take_few_rounds(build):
     curve = mesh.level_set(heights)
     phi = sh.piecewise_distance(mesh, curve)
     assert phi.diagnostics.note(Jumps).rounds <= 200 and phi.diagnostics.note(Jumps).continuous
-    plain = sh.SignedHeatSolver(mesh).distance(curve, sh.Free()).values
+    plain = sh.SignedHeatSolver(mesh).distance(curve, sh.constraints.Free()).values
     difference = phi.values.mean(axis=1) - plain[mesh.faces].mean(axis=1)
     assert np.sqrt(np.mean(difference**2)) < 0.02 * np.ptp(plain)
 

@@ -207,7 +207,7 @@ def test_points_with_normals_in_the_plane():
 
 def test_what_does_not_fit_is_refused():
     with refused(sh.errors.ConstraintError):
-        sh.signed_distance(sides(0.1), resolution=16, constraint=sh.EachComponent())
+        sh.signed_distance(sides(0.1), resolution=16, constraint=sh.constraints.EachComponent())
     with refused(sh.errors.UnsupportedTypeError, "band"):
         sh.signed_distance(sides(0.1), resolution=16, band=0.1)
     with refused(sh.errors.SourceError):

@@ -128,7 +128,7 @@ def test_seams_are_joined_whatever_rounded_them(units, scale, offset, whole):
         lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
         lambda mesh, curves: sh.SignedHeatSolver(mesh, intrinsic=True).distance(curves),
         lambda mesh, curves: sh.SignedHeatSolver(sh.intrinsic_delaunay(mesh, refine=True)).distance(curves).restrict(),
-        lambda mesh, curves: sh.sharpen(sh.SignedHeatSolver(mesh).distance(curves), method=sh.Convex()),
+        lambda mesh, curves: sh.sharpen(sh.SignedHeatSolver(mesh).distance(curves), method=sh.methods.Convex()),
     ],
     ids=["solver", "intrinsic", "triangulation", "sharpen"],
 )

@@ -200,7 +200,7 @@ def test_a_stray_arc_that_heat_closes_by_a_large_bulge_is_announced():
     """Shortest lines close it on 2.4 % of the area, heat on 6.2 %."""
     random = np.random.default_rng([4024, list(strokes.DAMAGES).index("long_strays")])
     drawing = strokes.drawing(random, "long_strays")
-    with pytest.warns(sh.InexactWarning, match="depends on curve number 6"):
+    with pytest.warns(sh.errors.InexactWarning, match="depends on curve number 6"):
         sh.signed_distance(drawing.given, drawing.mesh)
 
 

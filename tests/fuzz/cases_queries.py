@@ -21,7 +21,7 @@ def check_curves(given: Subject) -> str:
     random = given.random
     domain = surface(random)
     sources = [source(random, domain) for _ in range(random.integers(1, 3))]
-    asked = one_of(random, (None, None, sh.Free(), sh.ZeroSet(), constraint(random)))
+    asked = one_of(random, (None, None, sh.constraints.Free(), sh.constraints.ZeroSet(), constraint(random)))
     phi, warned = announced(
         lambda: sh.signed_distance(sources, domain, constraint=asked, as_oriented=chance(random, 0.3))
     )

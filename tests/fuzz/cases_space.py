@@ -138,7 +138,7 @@ def check_tets(given: Subject) -> str:
     size = size_of(np.stack([domain.vertices.min(axis=0), domain.vertices.max(axis=0)]), asked)
     judge(phi.values[np.unique(domain.tets)], warned, size * len(cells), "tets")
     if chance(random, 0.5):
-        sharp, _ = announced(lambda: sh.sharpen(phi, method=one_of(random, (None, sh.Convex(max_rounds=30)))))
+        sharp, _ = announced(lambda: sh.sharpen(phi, method=one_of(random, (None, sh.methods.Convex(max_rounds=30)))))
         judge(sharp.values[~np.isnan(phi.values)], False, size * len(cells), "sharpened")
     return "in part" if warned else "tets"
 
@@ -166,15 +166,15 @@ def check_arguments(given: Subject) -> str:
         (ball.polyline, {"points": ball.vertices[:3], "closed": False, "max_distance": 1.0}),
         (ball.level_set, {"values": ball.vertices[:, 0], "level": 0.1}),
         (ball.region_boundary, {"face_mask": ball.vertices[ball.faces[:, 0], 0] > 0}),
-        (sh.LevelValues, {"values": np.array([0.0, 1.0])}),
-        (sh.Soft, {"weight": 1.0}),
-        (sh.Geodesic, {"tolerance": 0.01}),
-        (sh.Convex, {"tolerance": 0.01, "max_rounds": 3, "relaxation": 1.5}),
+        (sh.constraints.LevelValues, {"values": np.array([0.0, 1.0])}),
+        (sh.constraints.Soft, {"weight": 1.0}),
+        (sh.methods.Geodesic, {"tolerance": 0.01}),
+        (sh.methods.Convex, {"tolerance": 0.01, "max_rounds": 3, "relaxation": 1.5}),
         (sh.SignedHeatSolver, {"domain": ball, "diffusion": 1.0}),
-        (sh.SignedHeatSolver(ball).distance, {"sources": ball.path([0, 1]), "constraint": sh.Free()}),
+        (sh.SignedHeatSolver(ball).distance, {"sources": ball.path([0, 1]), "constraint": sh.constraints.Free()}),
         (sh.complete, {"shape": ball, "keep_overlaps": False, "diffusion": 1.0}),
         (sh.signed_distance, {"source": ball, "resolution": 8, "padding": 0.1, "constraint": None, "diffusion": 1.0}),
-        (sh.sharpen, {"field": sh.VertexField(ball, ball.vertices[:, 2]), "method": sh.Geodesic()}),
+        (sh.sharpen, {"field": sh.VertexField(ball, ball.vertices[:, 2]), "method": sh.methods.Geodesic()}),
         (sh.VertexField(ball, ball.vertices[:, 2]), {"points": ball.vertices[:3]}),
         (sh.VertexField(ball, ball.vertices[:, 2]).contour, {"level": 0.0}),
         (sh.GridField, {"grid": sh.Grid((0, 0), 1.0, (3, 3)), "values": np.zeros((3, 3))}),

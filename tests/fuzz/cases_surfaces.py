@@ -121,12 +121,12 @@ def constraint(random: Random) -> Any:
         random,
         (
             None,
-            sh.ZeroSet(),
-            sh.ZeroSet(hard=True),
-            sh.Free(),
-            sh.EachComponent(),
-            sh.LevelValues([one_of(random, numbers) for _ in range(random.integers(1, 4))]),
-            sh.Soft(abs(one_of(random, numbers[1:]))),
+            sh.constraints.ZeroSet(),
+            sh.constraints.ZeroSet(hard=True),
+            sh.constraints.Free(),
+            sh.constraints.EachComponent(),
+            sh.constraints.LevelValues([one_of(random, numbers) for _ in range(random.integers(1, 4))]),
+            sh.constraints.Soft(abs(one_of(random, numbers[1:]))),
         ),
     )
 
@@ -192,7 +192,7 @@ def check_use(given: Subject) -> str:
     size = length_of_edges(embedded(phi.domain))
     kind = int(random.integers(6))
     if kind < 2:
-        method = one_of(random, (None, sh.Geodesic(), sh.Convex(max_rounds=30)))
+        method = one_of(random, (None, sh.methods.Geodesic(), sh.methods.Convex(max_rounds=30)))
         sharp, _ = announced(lambda: sh.sharpen(phi, method=method))
         lost = np.isnan(sharp.values) & ~np.isnan(phi.values)
         judge(sharp.values[~np.isnan(phi.values)], False, size, f"sharpened by {method}")

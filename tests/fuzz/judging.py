@@ -81,4 +81,4 @@ def length_of_edges(domain: Any) -> float:
 
 def levels_of(constraint: Any) -> float:
     """The largest level that a constraint asks for."""
-    return float(np.abs(constraint.values).max()) if isinstance(constraint, sh.LevelValues) else 0.0
+    return float(np.abs(constraint.values).max()) if isinstance(constraint, sh.constraints.LevelValues) else 0.0

@@ -85,7 +85,7 @@ def test_directions_agree_with_the_closed_form_kernel_sum():
     assert rms(angle[away]) < 2.0
 
     # the same Y integrated the same way: φ within the few hundredths of a cell that the two kernels differ by
-    constraint = sh.Free()
+    constraint = sh.constraints.Free()
     phi = [
         constraint.integrate(discretization.integration, divergence(y.reshape(*grid.shape, 3), grid.spacing), source)
         for y in (directions, exact)

@@ -162,13 +162,13 @@ def test_constraints():
     def off(constraint):
         return source.at_samples(solver.distance(shape, constraint).values)
 
-    free = off(sh.Free())
+    free = off(sh.constraints.Free())
     assert abs(np.average(free, weights=source.weights)) < 1e-10
-    soft = [rms(off(sh.Soft(weight / h))) for weight in (1e-4, 0.1, 10.0)]
+    soft = [rms(off(sh.constraints.Soft(weight / h))) for weight in (1e-4, 0.1, 10.0)]
     assert rms(free) == pytest.approx(soft[0], rel=1e-2)
     assert soft[0] > soft[1] > soft[2]
-    assert rms(off(sh.ZeroSet())) < 0.25 * rms(free)
-    assert np.abs(off(sh.ZeroSet(hard=True))).max() < 1e-8 * h
+    assert rms(off(sh.constraints.ZeroSet())) < 0.25 * rms(free)
+    assert np.abs(off(sh.constraints.ZeroSet(hard=True))).max() < 1e-8 * h
 
 
 def test_levels_of_several_sources_and_components():
@@ -178,23 +178,23 @@ def test_levels_of_several_sources_and_components():
     )
     solver, h = sh.SignedHeatSolver(box(40)), box(40).spacing[0]
     for sources in ([left, right], both):
-        field = solver.distance(sources, sh.LevelValues([0.0, 0.1]))
+        field = solver.distance(sources, sh.constraints.LevelValues([0.0, 0.1]))
         for shape, level in ((left, 0.0), (right, 0.1)):
             mean, spread = level_at(field, shape)
             assert mean == pytest.approx(level, abs=0.05 * h)
             assert spread < 0.3 * h
-    free = solver.distance(both, sh.EachComponent())
+    free = solver.distance(both, sh.constraints.EachComponent())
     assert max(level_at(free, left)[1], level_at(free, right)[1]) < 0.3 * h
     with refused(sh.errors.ConstraintError):
-        solver.distance([left, right], sh.LevelValues([0, 1, 2]))
+        solver.distance([left, right], sh.constraints.LevelValues([0, 1, 2]))
 
 
 def test_levels_of_sources_outside_of_the_grid_do_not_move_those_of_the_others():
     apart, one, outside = ([samples.sphere(1, 0.3, (x, 0, 0)) for x in xs] for xs in ((-1.0, 0.0), (1.0,), (50.0,)))
     solver = sh.SignedHeatSolver(sh.Grid((-1.5, -0.5, -0.5), 0.1, (31, 11, 11)))
     pair = samples.union(*apart)  # with as many components in all as there are sources
-    alone = solver.distance([pair, *one], sh.LevelValues([0.0, 0.1]))
-    beside = solver.distance([pair, *one, *outside], sh.LevelValues([0.0, 0.1, 5.0]))
+    alone = solver.distance([pair, *one], sh.constraints.LevelValues([0.0, 0.1]))
+    beside = solver.distance([pair, *one, *outside], sh.constraints.LevelValues([0.0, 0.1, 5.0]))
     assert np.array_equal(alone.values, beside.values)
 
 

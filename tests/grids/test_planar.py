@@ -78,9 +78,13 @@ def test_a_line_that_crosses_itself():
 
 def test_several_components_and_levels():
     inner, outer = circle(radius=0.5), circle(radius=1.0)
-    phi = sh.SignedHeatSolver(sh.Grid.around([inner, outer], 64)).distance([inner, outer], sh.LevelValues([0.0, 0.5]))
+    phi = sh.SignedHeatSolver(sh.Grid.around([inner, outer], 64)).distance(
+        [inner, outer], sh.constraints.LevelValues([0.0, 0.5])
+    )
     assert rms(phi.values - (away_from(phi) + 0.5)) < 0.01
-    each = sh.SignedHeatSolver(sh.Grid.around([inner, outer], 64)).distance([inner, outer], sh.EachComponent())
+    each = sh.SignedHeatSolver(sh.Grid.around([inner, outer], 64)).distance(
+        [inner, outer], sh.constraints.EachComponent()
+    )
     assert np.ptp(each([[1.0, 0.0], [0.0, 1.0]]) - each([[0.5, 0.0], [0.0, 0.5]])) < 0.01
     assert each([[1.0, 0.0]]) - each([[0.5, 0.0]]) == pytest.approx(0.5, abs=0.02)
 

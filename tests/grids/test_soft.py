@@ -21,12 +21,15 @@ CASES = {
 def test_weights_have_limits_on_both_ends(name):
     grid, shape = CASES[name]
     solver = sh.SignedHeatSolver(grid)
-    free, hard = solver.distance(shape, sh.Free()).values, solver.distance(shape, sh.ZeroSet(hard=True)).values
+    free, hard = (
+        solver.distance(shape, sh.constraints.Free()).values,
+        solver.distance(shape, sh.constraints.ZeroSet(hard=True)).values,
+    )
     reach = np.ptp(free)
     for weak in (1e-300, 1e-100, 1e-12):
-        np.testing.assert_allclose(solver.distance(shape, sh.Soft(weak)).values, free, atol=1e-5 * reach)
+        np.testing.assert_allclose(solver.distance(shape, sh.constraints.Soft(weak)).values, free, atol=1e-5 * reach)
     for strong in (1e12, 1e300):
-        np.testing.assert_array_equal(solver.distance(shape, sh.Soft(strong)).values, hard)
+        np.testing.assert_array_equal(solver.distance(shape, sh.constraints.Soft(strong)).values, hard)
 
 
 @pytest.mark.parametrize("weight", [1e-6, 1e-3, 1.0, 100.0, 1000.0])
@@ -52,5 +55,5 @@ def test_the_equation_is_solved(weight):
 def test_samples_that_nearly_coincide_stay_within_reason():
     """In one cell of a coarse grid: their levels contradict each other, as far as the grid can tell."""
     grid = sh.Grid((-3e12, -4e12, -2e12), 1e12, (7, 8, 6))
-    phi = sh.SignedHeatSolver(grid).distance([BALL, sphere(0)], sh.ZeroSet(hard=True))
+    phi = sh.SignedHeatSolver(grid).distance([BALL, sphere(0)], sh.constraints.ZeroSet(hard=True))
     assert np.abs(phi.values).max() < 1e14

@@ -55,7 +55,7 @@ def test_only_holes_up_to_a_size_or_those_that_are_named():
     assert small.face_areas.sum() + named.face_areas.sum() - sheet.face_areas.sum() == pytest.approx(400.0)
     outline = sh.fill_holes(sheet, rims=[0])
     assert len(outline.filled[0]) == 80 and len(outline.left) == 2
-    with pytest.raises(sh.SourceError, match="no rim passes through vertex 220"):
+    with pytest.raises(sh.errors.SourceError, match="no rim passes through vertex 220"):
         sh.fill_holes(sheet, rims=[220])
     assert sh.fill_holes(sheet, largest=1.0).n_faces == sheet.n_faces
 
@@ -113,7 +113,7 @@ def test_what_is_closed_or_a_single_face_is_left_alone():
     for given in (samples.sphere(2), sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])):
         made = sh.fill_holes(given)
         assert is_kept(given, made) and made.n_faces == given.n_faces and not made.filled
-    with pytest.raises(sh.GeometryError, match="no holes"):
+    with pytest.raises(sh.errors.GeometryError, match="no holes"):
         sh.fill_holes(sh.PointCloud([[0.0, 0, 0]]))
     with pytest.raises(sh.SignedHeatError, match="lids"):
         sh.fill_holes(samples.sphere(1), lids="round")

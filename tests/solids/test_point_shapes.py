@@ -59,5 +59,5 @@ def test_results_have_the_shape_of_the_points(name, shape):
 @pytest.mark.parametrize("name", QUERIES)
 def test_points_without_three_coordinates_are_refused(name):
     for points in (np.zeros((3, 2)), 1.0, np.zeros(0)):
-        with refused(sh.GeometryError, element="points"):
+        with refused(sh.errors.GeometryError, element="points"):
             QUERIES[name][0](points)

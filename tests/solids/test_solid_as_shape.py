@@ -26,7 +26,7 @@ def test_signed_distance_is_the_field_of_the_solid(options):
 
 
 def test_options_of_completion_are_refused():
-    with refused(sh.UnsupportedTypeError, element="completion"):
+    with refused(sh.errors.UnsupportedTypeError, element="completion"):
         sh.signed_distance(SOLID, completion="heat", resolution=9)
 
 
@@ -56,17 +56,17 @@ def test_a_grid_that_is_given_leaves_nothing_to_choose():
         (sh.Polyline([[0, 0], [1, 1]]), sh.Grid((0, 0), 1.0, (3, 3))),
     ):
         for option in ("resolution", "spacing", "padding"):
-            with refused(sh.UnsupportedTypeError, element=option):
+            with refused(sh.errors.UnsupportedTypeError, element=option):
                 sh.signed_distance(source, domain, **{option: 9})
     for option in ("resolution", "spacing", "padding"):
-        with refused(sh.UnsupportedTypeError, element=option):
+        with refused(sh.errors.UnsupportedTypeError, element=option):
             SOLID.field(grid=grid, **{option: 9})
     for made in (
         lambda: sh.morphology.dilate(BROKEN, 0.1, grid, resolution=9),
         lambda: sh.morphology.shell(BROKEN, -0.1, 0.0, grid, resolution=9),
         lambda: sh.morphology.thicken(BROKEN, 0.1, domain=grid, resolution=9),
     ):
-        with refused(sh.UnsupportedTypeError, element="resolution"):
+        with refused(sh.errors.UnsupportedTypeError, element="resolution"):
             made()
 
 
@@ -108,7 +108,7 @@ def test_files_have_the_solid_or_its_surface(tmp_path, save):
     assert surface.to_trimesh().volume == pytest.approx(SOLID.volume, rel=1e-6)
     save(SOLID, tmp_path / "ball.npz")
     np.testing.assert_array_equal(sh.io.load(tmp_path / "ball.npz").distance(POINTS), SOLID.distance(POINTS))
-    with refused(sh.FileFormatError, file="ball.xyzw"):
+    with refused(sh.errors.FileFormatError, file="ball.xyzw"):
         save(SOLID, tmp_path / "ball.xyzw")
 
 

@@ -210,9 +210,9 @@ def test_stores_hold_the_same_bits_whoever_computes_them(tmp_path):
 
 def test_options_of_stores_need_a_store(tmp_path):
     solid = sh.complete(samples.sphere(1))
-    with ThreadPoolExecutor() as pool, refused(sh.SourceError, element="scheduler"):
+    with ThreadPoolExecutor() as pool, refused(sh.errors.SourceError, element="scheduler"):
         solid.field(resolution=8, band=0.1, scheduler=pool)
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         solid.field(resolution=8, store=tmp_path / "dense")
 
 

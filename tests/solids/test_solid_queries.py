@@ -231,10 +231,10 @@ def test_what_is_no_solid_is_not_believed(tmp_path, name, new_key, kind):
     if new_key and name in ("one zero", "flat", "faces beyond", "open"):  # of which some make a solid of another kind
         try:
             again = (sh.io.load if kind == "solid" else sh.load_field)(path)
-        except sh.FileFormatError:
+        except sh.errors.FileFormatError:
             return
         queried = again if kind == "solid" else again.solid
         assert np.isfinite(queried.distance(points_around(queried))).all()
         return
-    with refused(sh.FileFormatError, file="one.npz"):
+    with refused(sh.errors.FileFormatError, file="one.npz"):
         (sh.io.load if kind == "solid" else sh.load_field)(path)

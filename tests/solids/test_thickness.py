@@ -142,7 +142,7 @@ def test_what_has_no_opposite_sides_says_so():
     found = sh.thickness(sh.TriangleMesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), resolution=1)
     assert np.isnan(found.values).all() and found.below(1) == 0 and "none opposite" in repr(found)
     for asked in (lambda: found.thinnest, lambda: found.percentiles([50])):
-        with refused(sh.SourceError, element="thickness"):
+        with refused(sh.errors.SourceError, element="thickness"):
             asked()
 
 
@@ -157,7 +157,7 @@ def test_percents_go_from_0_to_100(percents):
 
 
 def test_sheets_have_no_thickness():
-    with refused(sh.SourceError):
+    with refused(sh.errors.SourceError):
         sh.thickness(sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
 
 

@@ -90,7 +90,7 @@ def test_given_normals_are_seen_in_the_corrected_planes():
     north = AXIS - (middle @ AXIS / (middle**2).sum(axis=1))[:, None] * middle
     given = sh.Curve(curve.faces, curve.barycentric, closed=True, normals=north)
     solver = sh.SignedHeatSolver(surface)
-    errors = [cases.error(solver.distance(c, sh.Free()).values, exact) for c in (curve, given)]
+    errors = [cases.error(solver.distance(c, sh.constraints.Free()).values, exact) for c in (curve, given)]
     assert errors[1] < 1.1 * errors[0]  # four times as large if normals are seen in the planes of voxel faces
 
 
@@ -117,7 +117,11 @@ def test_polylines_in_space_are_laid_on_the_surface():
     equator = cases.parallel(200, 0.0)
     turn = np.linalg.svd(AXIS[None])[2]
     frame = np.stack([turn[1], np.cross(AXIS, turn[1]), AXIS])
-    phi = sh.SignedHeatSolver(surface).distance(surface.polyline(equator @ frame, closed=True), sh.Free()).values
+    phi = (
+        sh.SignedHeatSolver(surface)
+        .distance(surface.polyline(equator @ frame, closed=True), sh.constraints.Free())
+        .values
+    )
     assert cases.error(phi, latitude(surface) + np.arcsin(0.3)) < 0.02
 
 

@@ -37,7 +37,7 @@ def relative_error(n, shear, diffusion):
 
 @pytest.mark.parametrize("shear", [0.0, 0.5])
 def test_error_falls_like_the_triangles_size(shear):
-    coarse, fine = (relative_error(n, shear, sh.Extrapolated()) for n in (12, 36))
+    coarse, fine = (relative_error(n, shear, sh.methods.Extrapolated()) for n in (12, 36))
     assert np.log(coarse / fine) / np.log(3) > 0.7
     assert fine < 0.5 * min(relative_error(36, shear, tau) for tau in (1.0, 4.0))
 
@@ -90,13 +90,13 @@ def test_directions_are_extrapolated_beyond_the_range_of_numbers_too():
     assert len(stages) > 1
     directions = surface.to_cells(stages)
     assert np.allclose(np.abs(directions), 1, atol=1e-6)
-    field = sh.SignedHeatSolver(mesh, sh.Extrapolated(1.0)).distance(mesh.level_set(x, 0.5))
+    field = sh.SignedHeatSolver(mesh, sh.methods.Extrapolated(1.0)).distance(mesh.level_set(x, 0.5))
     assert np.allclose(field.values, x - 0.5, atol=1e-6)
 
 
 def test_one_time_in_space():
     with refused(sh.errors.UnsupportedTypeError, "diffusion"):
-        sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (8, 8)), sh.Extrapolated()).distance(
+        sh.SignedHeatSolver(sh.Grid((0, 0), 1.0, (8, 8)), sh.methods.Extrapolated()).distance(
             sh.Polyline([[2.0, 2.0], [5.0, 5.0]])
         )
 
@@ -104,8 +104,8 @@ def test_one_time_in_space():
 def test_many_sources_give_what_each_gives():
     mesh = lattice(10, 0.3)
     curves = [mesh.level_set(mesh.vertices[:, k], level) for k, level in ((0, 0.3), (1, -0.2))]
-    solver = sh.SignedHeatSolver(mesh, sh.Extrapolated())
-    for constraint in (sh.Free(), sh.ZeroSet()):
+    solver = sh.SignedHeatSolver(mesh, sh.methods.Extrapolated())
+    for constraint in (sh.constraints.Free(), sh.constraints.ZeroSet()):
         for together, curve in zip(solver.distance_many(curves, constraint), curves, strict=True):
             assert np.allclose(together.values, solver.distance(curve, constraint).values, rtol=0, atol=1e-9)
 
@@ -113,9 +113,11 @@ def test_many_sources_give_what_each_gives():
 def test_scale_and_side():
     mesh = lattice(10, 0.3)
     curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
-    values = sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance(curve).values
-    turned = sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance([c.reversed() for c in curve]).values
-    larger = sh.SignedHeatSolver(sh.TriangleMesh(1e3 * mesh.vertices, mesh.faces), sh.Extrapolated()).distance(curve)
+    values = sh.SignedHeatSolver(mesh, sh.methods.Extrapolated()).distance(curve).values
+    turned = sh.SignedHeatSolver(mesh, sh.methods.Extrapolated()).distance([c.reversed() for c in curve]).values
+    larger = sh.SignedHeatSolver(sh.TriangleMesh(1e3 * mesh.vertices, mesh.faces), sh.methods.Extrapolated()).distance(
+        curve
+    )
     assert np.allclose(turned, -values, atol=1e-9)
     assert np.allclose(larger.values, 1e3 * values, atol=1e-6)
 
@@ -123,17 +125,17 @@ def test_scale_and_side():
 @pytest.mark.parametrize("tau", [0.0, -1.0, np.nan, np.inf])
 def test_times_that_make_no_sense_are_refused(tau):
     with refused(sh.errors.SignedHeatError, "tau"):
-        sh.Extrapolated(tau)
+        sh.methods.Extrapolated(tau)
 
 
 def test_the_default_is_extrapolated_on_surfaces_alone():
     mesh = lattice(10, 0.3)
     for surface in (mesh, sh.PointCloud(mesh.vertices)):
-        assert default_diffusion(discretize(surface)) == sh.Extrapolated()
+        assert default_diffusion(discretize(surface)) == sh.methods.Extrapolated()
     assert default_diffusion(discretize(sh.Grid((0, 0), 1.0, (8, 8)))) == 1.0
     curve = mesh.level_set(np.hypot(*mesh.vertices[:, :2].T), 0.9)
     values = sh.SignedHeatSolver(mesh).distance(curve).values
-    assert np.array_equal(values, sh.SignedHeatSolver(mesh, sh.Extrapolated()).distance(curve).values)
+    assert np.array_equal(values, sh.SignedHeatSolver(mesh, sh.methods.Extrapolated()).distance(curve).values)
     assert not np.allclose(values, sh.SignedHeatSolver(mesh, 1.0).distance(curve).values, atol=1e-6)
     assert np.array_equal(values, sh.SignedHeatSolver(mesh).distance(curve).values)
 
@@ -144,7 +146,7 @@ def test_times_of_fine_surfaces_grow_so_that_their_error_falls():
     radius = np.hypot(*mesh.vertices[:, :2].T)
     curve = mesh.level_set(radius, 0.6)
     solver = sh.SignedHeatSolver(mesh)
-    grown, fixed = (s.distance(curve).values for s in (solver, solver.with_diffusion(sh.Extrapolated())))
+    grown, fixed = (s.distance(curve).values for s in (solver, solver.with_diffusion(sh.methods.Extrapolated())))
     errors = [np.sqrt(np.mean((values - radius + 0.6) ** 2)) for values in (grown, fixed)]
     assert errors[0] < 0.85 * errors[1]
 
@@ -156,7 +158,7 @@ def test_times_depend_on_the_extent_of_a_part_in_h_alone():
     faces = coarse.faces + coarse.n_vertices * np.arange(3)[:, None, None]
     parts = sh.TriangleMesh(copies.reshape(-1, 3), faces.reshape(-1, 3))
     one, three, finer = (default_diffusion(discretize(mesh)).tau for mesh in (coarse, parts, fine))
-    assert one > sh.Extrapolated().tau
+    assert one > sh.methods.Extrapolated().tau
     assert three == pytest.approx(one, rel=1e-9)
     assert finer / one == pytest.approx(1.5 ** (2 / 5), rel=1e-3)  # but for the edges of the boundary
 

@@ -42,7 +42,7 @@ def test_elements_are_numbered_as_potpourri3d_does():
     solver = pp3d.MeshSignedHeatSolver(BALL.vertices, BALL.faces)
     path = [(int(v), []) for v in pp3d_path(pp3d)]
     theirs = solver.compute_distance([path], preserve_source_normals=False, level_set_constraint="ZeroSet")
-    ours = sh.SignedHeatSolver(BALL, 1.0, intrinsic=False).distance(path, sh.ZeroSet(hard=True)).values
+    ours = sh.SignedHeatSolver(BALL, 1.0, intrinsic=False).distance(path, sh.constraints.ZeroSet(hard=True)).values
     np.testing.assert_allclose(ours, theirs, atol=1e-8)
     assert sh.signed_distance([curve], BALL).values.shape == (BALL.n_vertices,)
 
@@ -118,18 +118,18 @@ def test_a_missing_face_is_one_error_wherever_it_is_met(faces, tmp_path):
         lambda given: better.in_space(given.faces, given.barycentric),
     ]  # fmt: skip
     for measure in of_sources:
-        with refused(sh.SourceError, f"face {faces[0] or faces[1]}") as caught:
+        with refused(sh.errors.SourceError, f"face {faces[0] or faces[1]}") as caught:
             measure([click, RING, wrong])
         assert "curve 2: point" in str(caught.value)
     for evaluate in of_points:
-        with refused(sh.SourceError, f"face {faces[0] or faces[1]}"):
+        with refused(sh.errors.SourceError, f"face {faces[0] or faces[1]}"):
             evaluate(wrong)
 
 
 def test_levels_are_those_of_the_curves_given():
     low, click = BALL.level_set(BALL.vertices[:, 2], -0.4)[0], sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
-    solver, levels = sh.SignedHeatSolver(BALL), sh.LevelValues([9.0, 0.0, 0.5])
-    right = solver.distance([RING, low], sh.LevelValues([0.0, 0.5])).values
+    solver, levels = sh.SignedHeatSolver(BALL), sh.constraints.LevelValues([9.0, 0.0, 0.5])
+    right = solver.distance([RING, low], sh.constraints.LevelValues([0.0, 0.5])).values
     np.testing.assert_array_equal(solver.distance([click, RING, low], levels).values, right)
     np.testing.assert_allclose(solver.distance_many([[click, RING, low]], levels)[0].values, right, atol=1e-12)
 

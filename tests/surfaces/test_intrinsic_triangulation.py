@@ -133,10 +133,12 @@ def test_a_delaunay_mesh_gives_the_very_same_distance():
     curve = mesh.level_set(mesh.vertices[:, 2] + 0.3 * mesh.vertices[:, 0], 0.2)
     better = sh.intrinsic_delaunay(mesh)
     assert {*map(frozenset, better.faces.tolist())} == {*map(frozenset, mesh.faces.tolist())}
-    plain = sh.SignedHeatSolver(mesh, diffusion=2.0).distance(curve, constraint=sh.Free())
+    plain = sh.SignedHeatSolver(mesh, diffusion=2.0).distance(curve, constraint=sh.constraints.Free())
     h = sh.SignedHeatSolver(mesh).discretization.spacing
     own = sh.SignedHeatSolver(better).discretization.spacing
-    intrinsic = sh.SignedHeatSolver(better, diffusion=2.0 * (h / own) ** 2).distance(curve, constraint=sh.Free())
+    intrinsic = sh.SignedHeatSolver(better, diffusion=2.0 * (h / own) ** 2).distance(
+        curve, constraint=sh.constraints.Free()
+    )
     np.testing.assert_allclose(intrinsic.restrict().values, plain.values, atol=1e-11)
 
 
@@ -177,7 +179,7 @@ def error(mesh, field, radius=0.55):
 def test_bad_triangles_do_not_matter_any_more(stretch):
     mesh = stretched_square(1000, stretch)
     curve = circle_on(mesh)
-    plain = error(mesh, sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, constraint=sh.Free()))
+    plain = error(mesh, sh.SignedHeatSolver(mesh, intrinsic=False).distance(curve, constraint=sh.constraints.Free()))
     robust = sh.SignedHeatSolver(mesh, intrinsic=True).distance(curve)
     assert robust.domain is mesh and robust.values.shape == (mesh.n_vertices,)
     assert robust.diagnostics.note(IntrinsicTriangles) is not None

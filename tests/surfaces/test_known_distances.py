@@ -7,7 +7,13 @@ import signedheat as sh
 from shapes.surface_cases import sphere, square
 from shapes.surfaces import disk, surface_of_revolution
 
-constraints = [sh.Free(), sh.ZeroSet(), sh.EachComponent(), sh.LevelValues([0.0]), sh.Soft(5.0)]
+constraints = [
+    sh.constraints.Free(),
+    sh.constraints.ZeroSet(),
+    sh.constraints.EachComponent(),
+    sh.constraints.LevelValues([0.0]),
+    sh.constraints.Soft(5.0),
+]
 
 
 def rms(values):

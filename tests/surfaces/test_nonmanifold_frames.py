@@ -27,7 +27,7 @@ def test_distance_on_every_page_of_a_book(pages, number):
     exact = np.where(page == number % pages, away, -away) - 0.51
     exact[away < 1e-9] = -0.51
     beside = exact + 0.51 - 0.03  # in the very faces at the spine
-    values = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.level_set(beside), sh.Free()).values
+    values = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.level_set(beside), sh.constraints.Free()).values
     assert np.sqrt(np.mean((values - beside) ** 2)) < 1e-9
     values = sh.SignedHeatSolver(mesh, intrinsic=False).distance(mesh.level_set(exact)).values
     assert np.sqrt(np.mean((values - exact) ** 2)) < 2e-3
@@ -43,7 +43,8 @@ def test_the_order_and_sense_of_faces_do_not_matter(seed):
     order = np.random.default_rng(seed).permutation(mesh.n_faces)
     other = flipped(sh.TriangleMesh(mesh.vertices, mesh.faces[order]), seed=seed)
     one, two = (
-        sh.SignedHeatSolver(m, intrinsic=False).distance(m.level_set(exact), sh.Free()).values for m in (mesh, other)
+        sh.SignedHeatSolver(m, intrinsic=False).distance(m.level_set(exact), sh.constraints.Free()).values
+        for m in (mesh, other)
     )
     np.testing.assert_allclose(one, two, atol=1e-9)
 

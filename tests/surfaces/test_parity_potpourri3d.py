@@ -28,7 +28,11 @@ MESHES = {
     "frustum": (surface_of_revolution(lambda z: 1 + 0.3 * z, 2.0, 40, 14), [0.0, 0.3, 1.0], 0.9),
 }
 every_mesh = pytest.mark.parametrize("name", MESHES)
-CONSTRAINTS = {"None": sh.Free(), "ZeroSet": sh.ZeroSet(hard=True), "Multiple": sh.EachComponent(hard=True)}
+CONSTRAINTS = {
+    "None": sh.constraints.Free(),
+    "ZeroSet": sh.constraints.ZeroSet(hard=True),
+    "Multiple": sh.constraints.EachComponent(hard=True),
+}
 
 
 def nodes(mesh, curve):
@@ -115,11 +119,13 @@ def test_our_soft_constraint_keeps_its_meaning_when_scaled():
     curve, scale = curves[0], 1000.0
     large = sh.TriangleMesh(scale * mesh.vertices, mesh.faces)
     turned = sh.Curve(np.roll(curve.faces, 20), np.roll(curve.barycentric, 20, axis=0), closed=True)
-    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Soft(10.0)).values
-    scaled = sh.SignedHeatSolver(large, 1.0, intrinsic=False).distance(curve, sh.Soft(10.0 / scale)).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.constraints.Soft(10.0)).values
+    scaled = sh.SignedHeatSolver(large, 1.0, intrinsic=False).distance(curve, sh.constraints.Soft(10.0 / scale)).values
     np.testing.assert_allclose(scaled, scale * phi, atol=1e-9 * scale)
     np.testing.assert_allclose(
-        sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(turned, sh.Soft(10.0)).values, phi, atol=1e-10
+        sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(turned, sh.constraints.Soft(10.0)).values,
+        phi,
+        atol=1e-10,
     )
     theirs = peer(mesh, [curve], "ZeroSet", soft_level_set_weight=10.0)
     theirs_scaled = peer(large, [curve], "ZeroSet", soft_level_set_weight=10.0 / scale)

@@ -153,7 +153,7 @@ def test_polylines_and_paths_through_the_same_points_agree():
     by_ids = solver.distance(cloud.path(ids, closed=True)).values
     by_points = solver.distance(cloud.polyline(points[ids], closed=True)).values
     assert by_points == pytest.approx(by_ids, abs=1e-6)
-    between = solver.distance(cloud.polyline(cases.parallel(90, 0.1), closed=True), sh.Free()).values
+    between = solver.distance(cloud.polyline(cases.parallel(90, 0.1), closed=True), sh.constraints.Free()).values
     assert cases.error(between, np.arcsin(points[:, 2]) - np.arcsin(0.1)) < 4e-3
 
 

@@ -104,7 +104,7 @@ def test_a_polyline_with_corners_inside_faces_agrees_between_tessellations():
     probes = []
     for make in (cases.triangles, cases.quads, lambda n: cases.quads(n, 0.25), cases.bricks):
         mesh = sh.PolygonMesh(*make(40))
-        phi = sh.SignedHeatSolver(mesh, diffusion=4).distance(mesh.polyline(zigzag), sh.Free()).values
+        phi = sh.SignedHeatSolver(mesh, diffusion=4).distance(mesh.polyline(zigzag), sh.constraints.Free()).values
         near = [np.argmin(np.linalg.norm(mesh.vertices - [x, y, 0], axis=1)) for x in (-0.9, 0.9) for y in (-0.9, 0.9)]
         probes.append(phi[near])
     assert np.ptp(probes, axis=0).max() < 0.02

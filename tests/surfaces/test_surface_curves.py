@@ -170,11 +170,11 @@ def test_rounding_changes_no_number_of_points(intrinsic):
 def test_level_sets_boundaries_and_paths_survive_faces_turned_over():
     mesh = square(12, 0.3)
     values = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1])
-    phi = sh.SignedHeatSolver(mesh).distance(mesh.level_set(values, 0.5), sh.Free()).values
+    phi = sh.SignedHeatSolver(mesh).distance(mesh.level_set(values, 0.5), sh.constraints.Free()).values
     turned = flipped(mesh)
     curves = turned.level_set(values, 0.5)
     assert len(curves) == 1 and curves[0].closed and curves[0].normals is not None
-    other = sh.SignedHeatSolver(turned).distance(curves, sh.Free()).values
+    other = sh.SignedHeatSolver(turned).distance(curves, sh.constraints.Free()).values
     assert np.abs(other - phi).max() < 0.05  # normals by gradient here, by turning there
 
     region = mesh.vertices[mesh.faces].mean(axis=1)[:, 0] > 0.1

@@ -17,7 +17,13 @@ from signedheat.method import diffuse, integrate, normalize
 from signedheat.surfaces.surface_discretization import SurfaceDiscretization
 from signedheat.surfaces.vector_heat import vector_heat_forces, vector_heat_matrix
 
-CONSTRAINTS = [sh.Free(), sh.ZeroSet(), sh.EachComponent(), sh.LevelValues([0.3]), sh.Soft(2.0)]
+CONSTRAINTS = [
+    sh.constraints.Free(),
+    sh.constraints.ZeroSet(),
+    sh.constraints.EachComponent(),
+    sh.constraints.LevelValues([0.3]),
+    sh.constraints.Soft(2.0),
+]
 every_constraint = pytest.mark.parametrize("constraint", CONSTRAINTS, ids=repr)
 
 
@@ -47,11 +53,18 @@ def test_scale_and_rigid_motion(constraint):
     turn, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
     turn *= np.linalg.det(turn)
     moved = sh.TriangleMesh(scale * mesh.vertices @ turn.T + [5, -3, 1], mesh.faces)
-    scaled = {sh.Soft: lambda c: sh.Soft(c.weight / scale), sh.LevelValues: lambda c: sh.LevelValues([0.3 * scale])}
+    scaled = {
+        sh.constraints.Soft: lambda c: sh.constraints.Soft(c.weight / scale),
+        sh.constraints.LevelValues: lambda c: sh.constraints.LevelValues([0.3 * scale]),
+    }
     other = scaled.get(type(constraint), lambda c: c)(constraint)
     points = mesh.points_at([17])
-    phi = distance(mesh, [*loops(mesh)[:1], points][: 1 if type(constraint) is sh.LevelValues else 2], constraint)
-    same = distance(moved, [*loops(mesh)[:1], points][: 1 if type(constraint) is sh.LevelValues else 2], other)
+    phi = distance(
+        mesh, [*loops(mesh)[:1], points][: 1 if type(constraint) is sh.constraints.LevelValues else 2], constraint
+    )
+    same = distance(
+        moved, [*loops(mesh)[:1], points][: 1 if type(constraint) is sh.constraints.LevelValues else 2], other
+    )
     np.testing.assert_allclose(same, scale * phi, atol=1e-9 * scale)
 
 
@@ -60,7 +73,7 @@ def test_reversed_curves_change_the_sign(constraint):
     mesh = bumpy()
     curve = loops(mesh)[0]
     back = sh.Curve(curve.faces[::-1], curve.barycentric[::-1], closed=curve.closed)
-    other = sh.LevelValues([-0.3]) if isinstance(constraint, sh.LevelValues) else constraint
+    other = sh.constraints.LevelValues([-0.3]) if isinstance(constraint, sh.constraints.LevelValues) else constraint
     np.testing.assert_allclose(distance(mesh, back, other), -distance(mesh, curve, constraint), atol=1e-11)
 
 
@@ -101,9 +114,11 @@ def test_left_is_carried_along_a_curve_where_faces_are_turned(along_edges, seed)
     faces = np.where(turned[:, None], mesh.faces[:, [0, 2, 1]], mesh.faces)
     curve = mesh.path([0, 40, 90]) if along_edges else loops(mesh)[0]
     barycentric = np.where(turned[curve.faces][:, None], curve.barycentric[:, [0, 2, 1]], curve.barycentric)
-    phi = distance(mesh, curve, sh.ZeroSet())
+    phi = distance(mesh, curve, sh.constraints.ZeroSet())
     other = distance(
-        sh.TriangleMesh(mesh.vertices, faces), sh.Curve(curve.faces, barycentric, curve.closed), sh.ZeroSet()
+        sh.TriangleMesh(mesh.vertices, faces),
+        sh.Curve(curve.faces, barycentric, curve.closed),
+        sh.constraints.ZeroSet(),
     )
     np.testing.assert_allclose(other * np.sign(phi @ other), phi, atol=1e-10)
 
@@ -129,7 +144,7 @@ def test_nonorientable_surfaces_equal_their_double_cover(closed):
             weights=np.ones(len(samples)),
         )
         directions = normalize(surface, diffuse(surface, source))
-        fields.append((directions, integrate(surface, directions, source, sh.Free())))
+        fields.append((directions, integrate(surface, directions, source, sh.constraints.Free())))
     np.testing.assert_allclose(np.tile(fields[0][0], 2), fields[1][0], atol=1e-11)
     np.testing.assert_allclose(fields[0][1][gluing.below], fields[1][1], atol=1e-11)
 
@@ -142,11 +157,11 @@ def test_constraints_hold_at_every_sample():
     curves = loops(mesh)
     solver = sh.SignedHeatSolver(mesh, intrinsic=False)
     tolerance = 1e-8 * solver.discretization.spacing
-    field = solver.distance(curves, sh.ZeroSet(hard=True))
+    field = solver.distance(curves, sh.constraints.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < tolerance
-    field = solver.distance(curves, sh.LevelValues(range(len(curves)), hard=True))
+    field = solver.distance(curves, sh.constraints.LevelValues(range(len(curves)), hard=True))
     assert np.abs(field.source.interpolation @ field.values - field.source.source_ids).max() < tolerance
-    field = solver.distance(curves, sh.EachComponent(hard=True))
+    field = solver.distance(curves, sh.constraints.EachComponent(hard=True))
     levels = field.source.interpolation @ field.values
     means = np.bincount(field.source.components, levels) / np.bincount(field.source.components)
     assert np.abs(levels - means[field.source.components]).max() < tolerance
@@ -166,27 +181,31 @@ def test_each_component_is_the_minimum_over_all_constants():
         stiffness = surface.stiffness
         return 0.5 * (2 * phi @ (stiffness @ phi) - stiffness.diagonal() @ phi**2) - load @ phi
 
-    best = solver.distance(curves, sh.EachComponent())
+    best = solver.distance(curves, sh.constraints.EachComponent())
     levels = best.source.interpolation @ best.values
     constants = np.array([levels[best.source.components == k][0] for k in range(len(curves))])
     assert energy(best.values) < energy(solver.distance(curves).values)
     for k in range(len(curves)):
         nudge = 1e-3 * (np.arange(len(curves)) == k)
-        assert energy(best.values) < energy(solver.distance(curves, sh.LevelValues(constants + nudge)).values)
+        assert energy(best.values) < energy(
+            solver.distance(curves, sh.constraints.LevelValues(constants + nudge)).values
+        )
 
 
 def test_single_points_at_levels_of_their_own_constrain_nothing():
     """Each takes the level that φ has there anyway, beside a curve or alone."""
     mesh = bumpy()
     solver, points = sh.SignedHeatSolver(mesh, intrinsic=False), sh.SurfacePoints([3, 80, 200], np.full((3, 3), 1 / 3))
-    alone, free = (solver.distance(points, each).values for each in (sh.EachComponent(), sh.Free()))
+    alone, free = (
+        solver.distance(points, each).values for each in (sh.constraints.EachComponent(), sh.constraints.Free())
+    )
     assert np.abs(alone - free).max() < 1e-13
     curve = loops(mesh)[1]
-    beside = solver.distance([curve, points], sh.EachComponent())
+    beside = solver.distance([curve, points], sh.constraints.EachComponent())
     rows, single = beside.source.interpolation, beside.source.source_ids == 1
     phi = rows @ beside.values
     level = np.average(phi[~single], weights=beside.source.weights[~single])
-    held = solver.distance([curve, points], sh.LevelValues([0.0, *(phi[single] - level)])).values
+    held = solver.distance([curve, points], sh.constraints.LevelValues([0.0, *(phi[single] - level)])).values
     assert np.ptp(held - beside.values) < 1e-6 * np.ptp(held)
 
 
@@ -195,13 +214,13 @@ def test_dependent_rows_are_no_obstacle():
     mesh = bumpy()
     curve = loops(mesh)[0]
     twice = [curve, curve, mesh.points_at(mesh.faces[100]), sh.SurfacePoints([100], [[0.2, 0.3, 0.5]])]
-    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance([curve, curve], sh.ZeroSet(hard=True))
+    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance([curve, curve], sh.constraints.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
-    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(twice, sh.ZeroSet(hard=True))
+    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(twice, sh.constraints.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
     wave = mesh.vertices[:, 2] + 1e-7 * np.sin(1e3 * mesh.vertices[:, 0])
     close = mesh.level_set(mesh.vertices[:, 2], 0.2) + mesh.level_set(wave, 0.2)
-    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(close, sh.ZeroSet(hard=True))
+    field = sh.SignedHeatSolver(mesh, intrinsic=False).distance(close, sh.constraints.ZeroSet(hard=True))
     assert np.abs(field.source.interpolation @ field.values).max() < 1e-8 * 0.05
 
 
@@ -254,7 +273,10 @@ def test_the_zero_set_holds_however_curves_cross_the_mesh(make, seed):
     mesh = sphere(3)
     curve = make(mesh, np.random.default_rng(seed))
     solver = sh.SignedHeatSolver(mesh, intrinsic=False)
-    usual, hard = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(), sh.ZeroSet(hard=True)))
+    usual, hard = (
+        solver.distance(curve, constraint)
+        for constraint in (sh.constraints.ZeroSet(), sh.constraints.ZeroSet(hard=True))
+    )
     tolerance = 1e-8 * solver.discretization.spacing
     missed = np.abs(usual.source.interpolation @ usual.values)
     assert np.average(missed, weights=usual.source.weights) < 0.1 * solver.discretization.spacing
@@ -267,7 +289,7 @@ def test_levels_that_contradict_each_other_are_refused():
     x, y, _ = mesh.vertices.T
     crossing = [mesh.level_set(x, 0.1)[0], mesh.level_set(y, 0.1)[0], mesh.level_set(x, 0.1)[0]]
     with refused(sh.errors.ConstraintError, "vertex 281"):
-        sh.SignedHeatSolver(mesh, intrinsic=False).distance(crossing, sh.LevelValues([0.0, 0.0, 1.0]))
+        sh.SignedHeatSolver(mesh, intrinsic=False).distance(crossing, sh.constraints.LevelValues([0.0, 0.0, 1.0]))
 
 
 def test_a_zero_set_at_every_vertex_leaves_zero():
@@ -281,9 +303,9 @@ def test_soft_lies_between_free_and_zero_set():
         sh.SignedHeatSolver(mesh, intrinsic=False),
         [mesh.region_boundary(mesh.vertices[mesh.faces[:, 0], 2] > 0.2)[0]],
     )
-    free, hard = (solver.distance(curves, c).values for c in (sh.Free(), sh.ZeroSet()))
-    np.testing.assert_allclose(solver.distance(curves, sh.Soft(1e-7)).values, free, atol=1e-5)
-    np.testing.assert_allclose(solver.distance(curves, sh.Soft(1e8)).values, hard, atol=1e-5)
+    free, hard = (solver.distance(curves, c).values for c in (sh.constraints.Free(), sh.constraints.ZeroSet()))
+    np.testing.assert_allclose(solver.distance(curves, sh.constraints.Soft(1e-7)).values, free, atol=1e-5)
+    np.testing.assert_allclose(solver.distance(curves, sh.constraints.Soft(1e8)).values, hard, atol=1e-5)
     assert np.abs(free - hard).max() > 1e-3
 
 
@@ -305,7 +327,9 @@ def test_parts_do_not_know_of_each_other(constraint):
     solver = sh.SignedHeatSolver(
         one, (sh.SignedHeatSolver(both).discretization.spacing / spacing(one)) ** 2, intrinsic=False
     )
-    if isinstance(constraint, sh.ZeroSet | sh.EachComponent | sh.LevelValues):  # springs are measured in h
+    if isinstance(
+        constraint, sh.constraints.ZeroSet | sh.constraints.EachComponent | sh.constraints.LevelValues
+    ):  # springs are measured in h
         constraint = replace(constraint, hard=True)
         with pytest.warns(sh.errors.UnreachedWarning):
             field = sh.SignedHeatSolver(both, 1.0, intrinsic=False).distance(curve, constraint)
@@ -359,7 +383,7 @@ def test_the_pages_of_a_book(pages, constraint):
     signed = np.where((mesh.vertices[:, 0] > 1e-9) & (np.abs(mesh.vertices[:, 1]) < 1e-9), radius, -radius)
     (line,) = mesh.level_set(signed, 0.45)
     line = sh.Curve(line.faces, line.barycentric, normals=np.tile([1.0, 0.0, 0.0], (line.n_segments, 1)))
-    expected = signed - 0.45 + (0.3 if isinstance(constraint, sh.LevelValues) else 0)
+    expected = signed - 0.45 + (0.3 if isinstance(constraint, sh.constraints.LevelValues) else 0)
     np.testing.assert_allclose(distance(mesh, line, constraint), expected, atol=1e-8)
 
 
@@ -379,16 +403,16 @@ def test_nothing_is_factorised_twice(monkeypatch):
         )
     mesh = bumpy()
     curves, solver = loops(mesh), sh.SignedHeatSolver(mesh, intrinsic=False)
-    solver.distance(curves[0], sh.Free())
+    solver.distance(curves[0], sh.constraints.Free())
     vertices, edges = mesh.n_vertices, len(mesh.edges.vertices)
     assert sorted(made) == [vertices, edges]
-    solver.distance(curves[1], sh.Free())
+    solver.distance(curves[1], sh.constraints.Free())
     assert len(made) == 2
     solver.distance(curves)
     assert made[2:] == [vertices]
-    solver.distance(curves, sh.EachComponent())
-    solver.distance(curves, sh.LevelValues([0, 1, 2]))
-    solver.distance_many(curves, sh.Free())
+    solver.distance(curves, sh.constraints.EachComponent())
+    solver.distance(curves, sh.constraints.LevelValues([0, 1, 2]))
+    solver.distance_many(curves, sh.constraints.Free())
     assert len(made) == 3
     other = solver.with_diffusion(9.0)
     np.testing.assert_allclose(other.distance(curves).values, distance(mesh, curves, diffusion=9.0), atol=1e-12)
@@ -448,7 +472,10 @@ def test_points_inside_faces_are_interpolated_when_asked_for_and_cost_accuracy()
     inside = (curve.barycentric > 1e-9).all(axis=1)
     assert inside.any()
     height = 0.5 * mesh.edge_lengths.mean()
-    hard, usual = (solver.distance(curve, constraint) for constraint in (sh.ZeroSet(hard=True), sh.ZeroSet()))
+    hard, usual = (
+        solver.distance(curve, constraint)
+        for constraint in (sh.constraints.ZeroSet(hard=True), sh.constraints.ZeroSet())
+    )
     assert np.abs(hard(curve)).max() < 1e-8 * height
     assert np.abs(usual(curve)).max() < 0.1 * height
     exact = 0.8 - np.arccos(np.clip(mesh.vertices[:, 2], -1, 1))

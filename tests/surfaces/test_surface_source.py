@@ -42,7 +42,9 @@ def loop_of(mesh, height=0.31):
 def test_oriented_edge_curves_match_the_published_code():
     mesh = bumpy()
     vertices, _ = loop_of(mesh)
-    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(mesh.path(vertices[:40]), sh.Free()).values
+    phi = (
+        sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(mesh.path(vertices[:40]), sh.constraints.Free()).values
+    )
     ref = peer(mesh, [vertices[:40]])
     assert np.abs(phi - ref).max() < 1e-10 * np.ptp(ref)
 
@@ -54,13 +56,17 @@ def test_oriented_curves_across_faces_match_the_published_code():
     nodes = [(int(e), [float(s)]) for e, s in zip(places.elements, places.along, strict=True)]
     peer_solver = pp3d.MeshSignedHeatSolver(np.array(mesh.vertices), np.array(mesh.faces))
     ref = peer_solver.compute_distance([[*nodes, nodes[0]]], level_set_constraint="None")
-    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.constraints.Free()).values
     assert np.abs(phi - ref).max() < 1e-10 * np.ptp(ref)
 
 
 def test_points_match_the_published_code():
     mesh = bumpy()
-    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(mesh.points_at([5, 900, 1200]), sh.Free()).values
+    phi = (
+        sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
+        .distance(mesh.points_at([5, 900, 1200]), sh.constraints.Free())
+        .values
+    )
     assert difference(phi, peer(mesh, points=[5, 900, 1200])) < 1e-10
 
 
@@ -68,7 +74,7 @@ def test_unoriented_edge_curves_match_the_published_code_on_the_plane():
     mesh = square(14, 0.15)
     for vertices in ([60, 74, 88, 102], [60, 74, 89, 90, 104]):
         curve = mesh.path(vertices, oriented=False)
-        phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()).values
+        phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.constraints.Free()).values
         assert difference(phi, peer(mesh, [vertices], [False])) < 1e-10
 
 
@@ -77,11 +83,11 @@ def test_unoriented_ends_on_curved_vertices_are_symmetric_and_near_the_published
     mesh = bumpy()
     vertices = loop_of(mesh)[0][:30]
     curve = mesh.path(vertices, oriented=False)
-    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.Free()).values
+    phi = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curve, sh.constraints.Free()).values
     assert difference(phi, peer(mesh, [vertices], [False])) < 1e-3
     mirror = sh.TriangleMesh(mesh.vertices * np.array([1, 1, -1]), mesh.faces[:, ::-1])
     curve = mirror.path(vertices, oriented=False)
-    other = sh.SignedHeatSolver(mirror, 1.0, intrinsic=False).distance(curve, sh.Free()).values
+    other = sh.SignedHeatSolver(mirror, 1.0, intrinsic=False).distance(curve, sh.constraints.Free()).values
     assert np.abs(phi - other).max() < 1e-12
 
 
@@ -105,7 +111,7 @@ def test_points_and_curves_keep_their_weights_when_the_mesh_is_scaled():
     found = []
     for m in (mesh, big):
         sources = [m.path([40, 41, 42, 43]), m.points_at([180])]
-        found.append(sh.SignedHeatSolver(m, intrinsic=False).distance(sources, sh.Free()).values)
+        found.append(sh.SignedHeatSolver(m, intrinsic=False).distance(sources, sh.constraints.Free()).values)
     assert np.abs(found[1] / 1000 - found[0]).max() < 1e-12
 
     vertices = [40, 41, 42, 43]
@@ -277,8 +283,8 @@ def test_an_oriented_curve_that_meets_an_embedded_one_is_the_same_curve():
     mesh = square(16, 0.3)
     straight = mesh.polyline([[-0.9, 0.0713, 0], [0.9, 0.0713, 0]])
     stub = mesh.polyline([[0.9, 0.0713, 0], [0.95, 0.0713, 0]], oriented=False)
-    alone = sh.SignedHeatSolver(mesh, intrinsic=False).distance(straight, sh.Free()).values
-    together = sh.SignedHeatSolver(mesh, intrinsic=False).distance([straight, stub], sh.Free())
+    alone = sh.SignedHeatSolver(mesh, intrinsic=False).distance(straight, sh.constraints.Free()).values
+    together = sh.SignedHeatSolver(mesh, intrinsic=False).distance([straight, stub], sh.constraints.Free())
     assert together.diagnostics.note(VerticesAdded).vertices_added > 10  # the whole curve was embedded
     left = mesh.vertices[:, 0] < 0
     assert np.abs(together.values - alone)[left].max() < 0.06

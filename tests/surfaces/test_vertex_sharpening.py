@@ -117,7 +117,7 @@ def test_star_in_the_disk(diffusion, stretch, jitter):
     mesh = disk(2500, stretch, jitter)
     exact = polygon_distance(mesh.vertices[:, :2], STAR)
     plain = sh.SignedHeatSolver(mesh, diffusion, intrinsic=False).distance(
-        mesh.level_set(exact, 0.0), sh.ZeroSet(hard=True)
+        mesh.level_set(exact, 0.0), sh.constraints.ZeroSet(hard=True)
     )
     sharp = sh.sharpen(plain)
     before, after = error(plain.values, exact), error(sharp.values, exact)
@@ -150,7 +150,7 @@ def test_never_much_worse_than_before_on_awkward_triangles(kind, curve, diffusio
     corners = STAR if curve == "star" else 0.5 * np.stack([np.cos(t), np.sin(t)], axis=1)
     exact = polygon_distance(mesh.vertices[:, :2], corners)
     plain = sh.SignedHeatSolver(mesh, diffusion, intrinsic=False).distance(
-        mesh.level_set(exact, 0.0), sh.ZeroSet(hard=True)
+        mesh.level_set(exact, 0.0), sh.constraints.ZeroSet(hard=True)
     )
     assert error(sh.sharpen(plain).values, exact) <= 1.1 * error(plain.values, exact)
 
@@ -159,8 +159,8 @@ def test_convex_method_mends_a_long_diffusion():
     mesh = disk(2500)
     exact = polygon_distance(mesh.vertices[:, :2], STAR)
     solver = sh.SignedHeatSolver(mesh, 100.0, intrinsic=False)
-    plain = solver.distance(mesh.level_set(exact, 0.0), sh.ZeroSet(hard=True))
-    sharp = sh.sharpen(plain, method=sh.Convex())
+    plain = solver.distance(mesh.level_set(exact, 0.0), sh.constraints.ZeroSet(hard=True))
+    sharp = sh.sharpen(plain, method=sh.methods.Convex())
     ended = sharp.diagnostics.note(ConvexRounds)
     assert error(sharp.values, exact) < 0.25 * error(plain.values, exact)
     assert ended.residual <= 2e-3 and ended.rounds <= 200
@@ -176,7 +176,7 @@ def test_convex_method_leaves_an_exact_distance_alone():
     mesh = sh.TriangleMesh(np.stack([x, y, 0 * x], axis=1), Delaunay(np.stack([x, y + 0.01 * x], axis=1)).simplices)
     plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(x, 0.0))
     assert np.abs(np.abs(plain.values) - np.abs(x)).max() < 1e-9
-    assert np.abs(sh.sharpen(plain, method=sh.Convex()).values - plain.values).max() < 0.01
+    assert np.abs(sh.sharpen(plain, method=sh.methods.Convex()).values - plain.values).max() < 0.01
 
 
 def test_polygons_and_scale():
@@ -282,10 +282,13 @@ def test_sources_without_sides_on_other_domains():
 def test_convex_method_needs_a_source():
     mesh = sphere(2)
     with refused(sh.errors.SourceError):
-        sh.sharpen(sh.VertexField(mesh, mesh.vertices[:, 2]), method=sh.Convex())
+        sh.sharpen(sh.VertexField(mesh, mesh.vertices[:, 2]), method=sh.methods.Convex())
 
 
-@pytest.mark.parametrize("make", [lambda: sh.Convex(relaxation=2.0), lambda: sh.Geodesic(-1.0), lambda: sh.Convex(0.0)])
+@pytest.mark.parametrize(
+    "make",
+    [lambda: sh.methods.Convex(relaxation=2.0), lambda: sh.methods.Geodesic(-1.0), lambda: sh.methods.Convex(0.0)],
+)
 def test_bad_options(make):
     with pytest.raises(ValueError):
         make()
@@ -302,7 +305,7 @@ def test_progress_can_cancel():
     mesh = disk(300)
     plain = sh.SignedHeatSolver(mesh).distance(mesh.level_set(mesh.vertices[:, 0] ** 3 + mesh.vertices[:, 1], 0.0))
     with pytest.raises(Stop):
-        sh.sharpen(plain, method=sh.Convex(), progress=progress)
+        sh.sharpen(plain, method=sh.methods.Convex(), progress=progress)
 
 
 def latitudes(vertices: np.ndarray) -> np.ndarray:

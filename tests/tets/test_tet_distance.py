@@ -36,7 +36,14 @@ def tilted(shift: float = 1.0):
 
 
 @pytest.mark.parametrize(
-    "constraint", [sh.Free(), sh.ZeroSet(), sh.ZeroSet(hard=True), sh.EachComponent(), sh.Soft(5.0)]
+    "constraint",
+    [
+        sh.constraints.Free(),
+        sh.constraints.ZeroSet(),
+        sh.constraints.ZeroSet(hard=True),
+        sh.constraints.EachComponent(),
+        sh.constraints.Soft(5.0),
+    ],
 )
 def test_distance_from_a_plane_is_exact(cube, constraint):
     shape, exact = tilted()
@@ -61,7 +68,13 @@ def test_shaken_lattices_are_as_good_as_lattices(noise, when):
 def test_both_ways_of_solving_agree(cube, sizes, monkeypatch):
     ball = sphere(3, 0.6)
     ball = sh.TriangleMesh(ball.vertices + 1, ball.faces)
-    constraints = (sh.ZeroSet(), sh.EachComponent(), sh.LevelValues([2.0]), sh.Soft(3.0), sh.Free())
+    constraints = (
+        sh.constraints.ZeroSet(),
+        sh.constraints.EachComponent(),
+        sh.constraints.LevelValues([2.0]),
+        sh.constraints.Soft(3.0),
+        sh.constraints.Free(),
+    )
     reference = [distance(cube, ball, constraint).values for constraint in constraints]
     monkeypatch.setattr(lowering, "DIRECT_FACES", sizes[0])
     monkeypatch.setattr(lowering, "DIRECT_VERTICES", sizes[1])
@@ -88,7 +101,10 @@ def around_a_ball():
     return sh.SignedHeatSolver(lattice(9))
 
 
-@pytest.mark.parametrize("constraint", [sh.Free(), sh.ZeroSet(), sh.EachComponent(), sh.Soft(10.0)])
+@pytest.mark.parametrize(
+    "constraint",
+    [sh.constraints.Free(), sh.constraints.ZeroSet(), sh.constraints.EachComponent(), sh.constraints.Soft(10.0)],
+)
 def test_curved_sources_leave_no_offset(constraint, around_a_ball):
     """The interpolant of the distance lies 0.011 above it on the sphere, on average; values and φ itself do not."""
     ball = sphere(4)
@@ -108,7 +124,7 @@ def test_on_faces_of_the_mesh_it_is_the_plain_recipe():
     mesh = lattice(9)
     inside = np.linalg.norm(mesh.tet_barycenters, axis=1) < 1
     shape = sh.TetMesh(mesh.vertices, mesh.tets[inside]).boundary
-    gap = distance(mesh, sh.TriangleMesh(mesh.vertices, same_vertices(mesh, shape)), sh.Free()).values
+    gap = distance(mesh, sh.TriangleMesh(mesh.vertices, same_vertices(mesh, shape)), sh.constraints.Free()).values
     gap -= plain_recipe(mesh, sh.TriangleMesh(mesh.vertices, same_vertices(mesh, shape)))
     assert np.ptp(gap) < 1e-4  # directions by conjugate gradients there, by elimination here
 
@@ -142,16 +158,16 @@ def test_level_values_and_groups(cube):
     low, high = (tilted(shift)[0] for shift in (0.8, 1.2))
     exact = tilted(0.8)[1]
     gap = exact(np.full(3, 1.2))
-    phi = distance(cube, [low, high], sh.LevelValues([0.0, gap]))
+    phi = distance(cube, [low, high], sh.constraints.LevelValues([0.0, gap]))
     assert np.abs(phi.values - exact(cube.vertices)).max() < 0.05
-    shifted = distance(cube, [low, high], sh.LevelValues([5.0, 5.0 + gap]))
+    shifted = distance(cube, [low, high], sh.constraints.LevelValues([5.0, 5.0 + gap]))
     assert np.abs(shifted.values - phi.values - 5).max() < 1e-6
-    grouped = distance(cube, [low, high], sh.EachComponent())
+    grouped = distance(cube, [low, high], sh.constraints.EachComponent())
     middle = exact(cube.vertices) - gap / 2  # the mean over both sheets is zero
     inner = (cube.vertices > 0.5).all(axis=1) & (cube.vertices < 1.5).all(axis=1)
     assert np.abs(grouped.values - middle)[inner].max() < 0.1
     with refused(sh.errors.ConstraintError):
-        distance(cube, [low, high], sh.LevelValues([0.0, 1.0, 2.0]))
+        distance(cube, [low, high], sh.constraints.LevelValues([0.0, 1.0, 2.0]))
 
 
 def test_invariances(cube):

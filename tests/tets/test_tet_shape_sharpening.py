@@ -91,7 +91,7 @@ def test_points_and_methods_beside_shapes_are_refused(tets):
     with refused(SourceError, "shape"):
         sh.sharpen(field, cloud)
     with refused(UnsupportedTypeError):
-        sh.sharpen(field, cube(0.8), method=sh.Convex())
+        sh.sharpen(field, cube(0.8), method=sh.methods.Convex())
 
 
 def test_it_can_be_cancelled(tets):

@@ -104,7 +104,7 @@ def test_convex_method_holds_slopes_and_signs():
     mesh = lattice(12)
     plain = sh.SignedHeatSolver(mesh).distance(sphere(4))
     seen = []
-    sharp = sh.sharpen(plain, method=sh.Convex(), progress=lambda *step: seen.append(step))
+    sharp = sh.sharpen(plain, method=sh.methods.Convex(), progress=lambda *step: seen.append(step))
     ended = sharp.diagnostics.note(ConvexRounds)
     assert ended.residual <= 2e-3 and ended.rounds <= 200 and ended.rounds < len(seen)
     excess = np.maximum(np.linalg.norm(sharp.tet_gradients, axis=1) - 1, 0)
@@ -118,7 +118,7 @@ def test_convex_method_leaves_an_exact_distance_alone():
     wall = rectangle([-1, -1, 0.9], [4, 0, 0], [0, 4, 0])
     plain = sh.SignedHeatSolver(mesh).distance(wall)
     assert np.abs(plain.values - (mesh.vertices[:, 2] - 0.9)).max() < 1e-5
-    assert np.abs(sh.sharpen(plain, method=sh.Convex()).values - plain.values).max() < 0.02
+    assert np.abs(sh.sharpen(plain, method=sh.methods.Convex()).values - plain.values).max() < 0.02
 
 
 def test_what_is_unknown_stays_unknown():
@@ -138,7 +138,7 @@ def test_fields_from_files_can_be_sharpened(tmp_path):
     loaded = sh.load_field(tmp_path / "phi.vtu")
     assert np.array_equal(sh.sharpen(loaded).values, sh.sharpen(plain).values)
     with refused(sh.errors.SourceError):
-        sh.sharpen(loaded, method=sh.Convex())
+        sh.sharpen(loaded, method=sh.methods.Convex())
 
 
 def test_one_sign_is_refused():
@@ -158,4 +158,4 @@ def test_progress_can_cancel():
     mesh = lattice(8)
     plain = sh.SignedHeatSolver(mesh).distance(sphere(3))
     with pytest.raises(Stop):
-        sh.sharpen(plain, method=sh.Convex(), progress=progress)
+        sh.sharpen(plain, method=sh.methods.Convex(), progress=progress)

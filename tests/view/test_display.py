@@ -68,9 +68,14 @@ def test_text_is_short(make):
 
 def test_notes_and_results_are_short_text_too():
     field = sh.signed_distance(samples.with_flipped_faces(BALL, 0.2), resolution=16)
-    for thing in (field.diagnostics, *field.diagnostics.notes, sh.orientation(BALL), sh.LevelValues(np.arange(99) / 7)):
+    for thing in (
+        field.diagnostics,
+        *field.diagnostics.notes,
+        sh.orientation(BALL),
+        sh.constraints.LevelValues(np.arange(99) / 7),
+    ):
         assert not re.search(r"\d\.\d{9}|array\(|object at", repr(thing))
-    assert repr(sh.LevelValues([1 / 3, 2.0])) == "LevelValues(values=(0.3333, 2), hard=False)"
+    assert repr(sh.constraints.LevelValues([1 / 3, 2.0])) == "LevelValues(values=(0.3333, 2), hard=False)"
 
 
 @pytest.mark.parametrize("make", THINGS.values(), ids=THINGS)
@@ -139,7 +144,7 @@ def test_grids_go_to_pyvista():
 @pytest.mark.parametrize("make", EMPTY.values(), ids=EMPTY)
 def test_windows_refuse_fields_without_values(make):
     pytest.importorskip("pyvista")
-    with refused(sh.GeometryError, element="field"):
+    with refused(sh.errors.GeometryError, element="field"):
         make().plotter()
 
 

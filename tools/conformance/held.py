@@ -79,13 +79,15 @@ def held(name: str, theirs: Callable[..., Any], ours: Callable[..., Pairs], tole
 # potpourri3d
 
 
-def constraint_of(word: str, weight: float) -> sh.Free | sh.ZeroSet | sh.EachComponent:
+def constraint_of(
+    word: str, weight: float
+) -> sh.constraints.Free | sh.constraints.ZeroSet | sh.constraints.EachComponent:
     if weight > 0:
         raise NotOurs("its soft constraint pulls to the first node of a curve")
-    words: dict[str, sh.Free | sh.ZeroSet | sh.EachComponent] = {
-        "none": sh.Free(),
-        "zeroset": sh.ZeroSet(hard=True),
-        "multiple": sh.EachComponent(hard=True),
+    words: dict[str, sh.constraints.Free | sh.constraints.ZeroSet | sh.constraints.EachComponent] = {
+        "none": sh.constraints.Free(),
+        "zeroset": sh.constraints.ZeroSet(hard=True),
+        "multiple": sh.constraints.EachComponent(hard=True),
     }
     return words[word.lower()]
 

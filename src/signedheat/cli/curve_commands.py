@@ -209,7 +209,9 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
     intrinsic: Literal[True, "auto"] = True if arguments.intrinsic else "auto"
     field: sh.VertexField
     with shapes.prefix_errors(arguments.curves), ProgressBar(is_quiet(arguments)) as progress:
-        if arguments.plain or not isinstance(constraint, sh.Free | sh.ZeroSet | sh.Soft):
+        if arguments.plain or not isinstance(
+            constraint, sh.constraints.Free | sh.constraints.ZeroSet | sh.constraints.Soft
+        ):
             field = sh.SignedHeatSolver(domain, arguments.diffusion, progress, intrinsic).distance(sources, constraint)
         else:
             field = distance.distance_to_curves(

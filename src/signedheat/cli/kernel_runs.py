@@ -60,7 +60,7 @@ def surfaces() -> None:
     curve = _curve(ball)
     field = sh.SignedHeatSolver(ball).distance([curve, ball.points_at(3)])
     field.contour(0.1)
-    for how in (None, sh.Convex(), sh.Geodesic()):
+    for how in (None, sh.methods.Convex(), sh.methods.Geodesic()):
         sh.sharpen(field) if how is None else sh.sharpen(field, method=how)
     sh.sharpen(sh.SignedHeatSolver(ball).distance(sh.Curve(curve.faces, curve.barycentric, oriented=False)))
 

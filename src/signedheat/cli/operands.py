@@ -179,14 +179,14 @@ def constraint_of(word: str) -> Constraint:
     """
     name, _, values = word.partition(":")
     if name == "levels":
-        return sh.LevelValues([float(value) for value in values.split(",")])
+        return sh.constraints.LevelValues([float(value) for value in values.split(",")])
     if name == "soft":
-        return sh.Soft(float(values)) if values else sh.Soft()
+        return sh.constraints.Soft(float(values)) if values else sh.constraints.Soft()
     named: dict[str, Constraint] = {
-        "free": sh.Free(),
-        "zero-set": sh.ZeroSet(),
-        "hard": sh.ZeroSet(hard=True),
-        "each-component": sh.EachComponent(),
+        "free": sh.constraints.Free(),
+        "zero-set": sh.constraints.ZeroSet(),
+        "hard": sh.constraints.ZeroSet(hard=True),
+        "each-component": sh.constraints.EachComponent(),
     }
     return named[word]
 

@@ -49,7 +49,7 @@ class Extrapolated:
     >>> import signedheat as sh
     >>> from signedheat.samples import sphere
     >>> ball = sphere(3)
-    >>> solver = sh.SignedHeatSolver(ball, sh.Extrapolated(tau=4))
+    >>> solver = sh.SignedHeatSolver(ball, sh.methods.Extrapolated(tau=4))
     >>> equator = ball.level_set(ball.vertices[:, 2], 0.0)
     >>> bool(abs(solver.distance(equator).values - np.arcsin(ball.vertices[:, 2])).max() < 0.05)
     True
