@@ -74,7 +74,7 @@ def cases() -> Iterator[tuple[str, Callable[[], Case]]]:
 
 def row(mesh: sh.TriangleMesh, curves: list[sh.Curve], **options: object) -> str:
     start = time.process_time()
-    phi = sh.piecewise_distance(mesh, curves, **options)
+    phi = sh.piecewise_distance(curves, mesh, **options)
     seconds = time.process_time() - start
     note = phi.diagnostics.note(Jumps)
     ends = Counter(int(end) for line in phi.cut for end in line.vertices[[0, -1]])

@@ -199,7 +199,7 @@ CASES: dict[str, Callable[[], Floats]] = {
     "strokes, some turned": lambda: strokes(True),
     "a gap": lambda: values(sh.signed_distance(ring(SURFACE, 0, 0.85), SURFACE)),
     "drawing": drawing,
-    "jumps": lambda: values(sh.piecewise_distance(SURFACE, [ring(SURFACE, 0, 0.6), ring(SURFACE, 0.1, 0.3, 1.0)])),
+    "jumps": lambda: values(sh.piecewise_distance([ring(SURFACE, 0, 0.6), ring(SURFACE, 0.1, 0.3, 1.0)], SURFACE)),
     "surface": on_a_surface,
     "thin triangles": on_thin_triangles,
     "point cloud": on_points,

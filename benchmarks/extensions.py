@@ -57,7 +57,7 @@ def jumps(large: bool) -> None:
             "Möbius core": (strip, strip.path(np.arange(around) * (2 * half + 1) + half, closed=True)),
         }
         for name, (mesh, curve) in cases.items():
-            phi, seconds = timed(lambda mesh=mesh, curve=curve: sh.piecewise_distance(mesh, curve))
+            phi, seconds = timed(lambda mesh=mesh, curve=curve: sh.piecewise_distance(curve, mesh))
             jumps = phi.diagnostics.note(Jumps)
             print(f"{name:18} {mesh.n_faces:8d} {seconds:8.2f} {jumps.rounds:7d} {jumps.gap:8.2%}", flush=True)
 

@@ -77,7 +77,7 @@ def piecewise_on_many_parts(n: int) -> Callable[[], object]:
     vertices = (corners + shifts[:, None]).reshape(-1, 3)
     mesh = sh.TriangleMesh(vertices, (faces + 6 * np.arange(n)[:, None, None]).reshape(-1, 3))
     curves = [mesh.path([6 * k, 6 * k + 2]) for k in range(n)]
-    return lambda: sh.piecewise_distance(mesh, curves)
+    return lambda: sh.piecewise_distance(curves, mesh)
 
 
 def groups_on_tets(n: int) -> Callable[[], object]:

@@ -117,7 +117,7 @@ def piecewise(size: int) -> tuple[Callable[[], object], float]:
     """Half of the equator, which bounds nothing."""
     mesh = triangulated(size)
     half = mesh.path(size // 2 * 2 * size + np.arange(size))
-    return lambda: sh.piecewise_distance(mesh, half), piecewise_estimate(mesh.n_faces)
+    return lambda: sh.piecewise_distance(half, mesh), piecewise_estimate(mesh.n_faces)
 
 
 def phi_alone(balls: int, size: int) -> tuple[Callable[[], object], float]:

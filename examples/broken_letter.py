@@ -20,13 +20,13 @@ def broken(corners: np.ndarray, gap: float) -> list[sh.Polyline]:
 
 
 sides = broken(LETTER, gap=0.3)
-sh.io.write_polylines("broken.svg", sides)
+sh.io.write_polylines(sides, "broken.svg")
 figure = view.new_figure(11, 6.5)
 areas, cuts = [], []
 for k, (name, diffusion) in enumerate([("sharp", 1.0), ("round", 30.0)]):
     phi = sh.SignedHeatSolver(sh.Grid.around(sides, 160, padding=0.8), diffusion=diffusion).distance(sides)
     outline = max(phi.contour(0.0), key=lambda line: line.length)
-    sh.io.write_polylines(f"{name}.svg", outline)
+    sh.io.write_polylines(outline, f"{name}.svg")
 
     areas.append(-outline.signed_area)
     cuts.append(np.linalg.norm(outline.points - LETTER[1], axis=1).min())

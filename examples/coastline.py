@@ -25,13 +25,15 @@ points = np.array([direction(*place) for place in coast])
 pieces = [globe.polyline(points[a : a + 16]) for a in range(0, 170, 22)]  # six of 22 steps are missing
 
 phi = sh.signed_distance(pieces, globe)
-whole = sh.close_curves(globe, pieces)
+whole = sh.close_curves(pieces, globe)
 
 eye = direction(-50.0, 25.0)
 view.save_row(
+    [
+        ("the pieces, and distance from the coast", phi, {"sources": pieces, "view": eye}),
+        ("the coast, closed", phi, {"sources": whole, "view": eye}),
+    ],
     "coastline.png",
-    ("the pieces, and distance from the coast", phi, {"sources": pieces, "view": eye}),
-    ("the coast, closed", phi, {"sources": whole, "view": eye}),
 )
 middle = direction(-60.0, 15.0)
 away = np.arccos([direction(*place) @ middle for place in coast])

@@ -36,11 +36,11 @@ sides = [np.array([[0.6, -0.3, 0], [0.6, 0.3, 0]]) @ rotation(quarter).T for qua
 broken = [mesh.polyline(side) for side in sides]
 fields = [sh.SignedHeatSolver(mesh, diffusion).distance(broken) for diffusion in (1, 10, 100, 1000)]
 view.save_row(
-    "completion_and_diffusion.png",
-    *(
+    (
         (f"diffusion = {diffusion}", phi, {"sources": broken, "view": np.array([0.0, 0.0, 1.0])})
         for diffusion, phi in zip((1, 10, 100, 1000), fields, strict=True)
     ),
+    "completion_and_diffusion.png",
 )
 phi = fields[-1]
 (whole, *_) = sorted(phi.contour(0.0), key=lambda curve: -curve.n_points)

@@ -22,12 +22,14 @@ strokes = [part.polyline(seam[a : a + 20], max_distance=0.5) for a in range(0, 2
 
 phi = sh.sharpen(sh.SignedHeatSolver(part).distance(strokes, sh.constraints.Free()))
 stitches = [curve for level in (-0.2, -0.1, 0.1, 0.2) for curve in phi.contour(level)]
-sh.io.write_curves("stitches.obj", stitches, part)
+sh.io.write_curves(stitches, "stitches.obj", part)
 
 view.save_row(
+    [
+        ("strokes, and distance", phi, {"sources": strokes, "view": np.array([0.3, -0.5, 1.0])}),
+        ("lines at ±0.1 and ±0.2", phi, {"sources": stitches, "view": np.array([0.3, -0.5, 1.0])}),
+    ],
     "curve_design.png",
-    ("strokes, and distance", phi, {"sources": strokes, "view": np.array([0.3, -0.5, 1.0])}),
-    ("lines at ±0.1 and ±0.2", phi, {"sources": stitches, "view": np.array([0.3, -0.5, 1.0])}),
 )
 lengths = [np.linalg.norm(np.diff(part.vertices[part.faces[c.faces, 0]], axis=0), axis=1).sum() for c in stitches]
 

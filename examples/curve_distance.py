@@ -25,9 +25,11 @@ errors = [float(np.sqrt(np.mean((field.values - truth) ** 2)) / np.ptp(truth)) f
 
 look = {"sources": pieces, "view": np.array([1.0, -1.0, 0.8])}
 view.save_row(
+    [
+        (f"the method alone: error {100 * errors[0]:.2f} %", fields[0], look),
+        (f"signed_distance: error {100 * errors[1]:.2f} %", fields[1], look),
+    ],
     "curve_distance.png",
-    (f"the method alone: error {100 * errors[0]:.2f} %", fields[0], look),
-    (f"signed_distance: error {100 * errors[1]:.2f} %", fields[1], look),
 )
 
 # %%

@@ -18,10 +18,12 @@ grid = sh.Grid((-1.2, -1.2), 0.02, (121, 121))
 exact = sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 1)
 thin = found.points[np.abs(found.points[:, 1]) < 0.1][:, [0, 2]]
 view.save_row(
+    [
+        ("the shape", ball),
+        ("samples in a slice", exact, {"shape": sh.PointCloud(thin)}),
+        ("all samples", sh.PointCloud(found.points)),
+    ],
     "deepsdf_set.png",
-    ("the shape", ball),
-    ("samples in a slice", exact, {"shape": sh.PointCloud(thin)}),
-    ("all samples", sh.PointCloud(found.points)),
 )
 
 # %%

@@ -22,9 +22,11 @@ found = sh.deviation(scan, nominal)
 found.save("histogram.png")
 found.save("deviation.ply")
 view.save_row(
+    [
+        ("the nominal part, broken", nominal),
+        (f"{found.within(0.015):.0%} of the scan within .015", sh.VertexField(scan, found.distances)),
+    ],
     "deviation_of_a_scan.png",
-    ("the nominal part, broken", nominal),
-    (f"{found.within(0.015):.0%} of the scan within .015", sh.VertexField(scan, found.distances)),
 )
 
 # %%

@@ -17,9 +17,11 @@ part = samples.torus(1.0, 0.45)
 source = part.points_at([200, 2500])
 on_part = sh.sharpen(sh.SignedHeatSolver(part).distance(source))
 view.save_row(
+    [
+        ("from both poles", phi, {"sources": [poles]}),
+        ("from two points of a torus", on_part, {"sources": [source], "view": np.array([0.4, -0.6, 0.9])}),
+    ],
     "distance_from_points.png",
-    ("from both poles", phi, {"sources": [poles]}),
-    ("from two points of a torus", on_part, {"sources": [source], "view": np.array([0.4, -0.6, 0.9])}),
 )
 
 # %%

@@ -42,9 +42,11 @@ grid = sh.Grid((-1.0, -1.0), 0.01, (201, 201))
 points = np.concatenate([grid.points.reshape(-1, 2), np.zeros((grid.n_nodes, 1))], axis=1)
 shown = [sh.GridField(grid, field(points).reshape(grid.shape)) for field in (plain, robust)]
 view.save_row(
+    [
+        (f"{mesh.n_faces} bad triangles: error {100 * error(plain):.0f} %", shown[0]),
+        (f"{better.n_faces} intrinsic ones: {100 * error(robust.restrict()):.2f} %", shown[1]),
+    ],
     "distance_on_bad_triangles.png",
-    (f"{mesh.n_faces} bad triangles: error {100 * error(plain):.0f} %", shown[0]),
-    (f"{better.n_faces} intrinsic ones: {100 * error(robust.restrict()):.2f} %", shown[1]),
 )
 
 # %%

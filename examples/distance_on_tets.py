@@ -16,10 +16,8 @@ offset = phi.offset(0.5)
 
 cut = sh.TetMesh(mesh.vertices, mesh.tets[mesh.tet_barycenters[:, 1] > 0])
 view.save_row(
+    [("half of the tets", cut, {"view": (20, -70)}), ("signed distance", phi), ("the offset of 0.5", offset)],
     "distance_on_tets.png",
-    ("half of the tets", cut, {"view": (20, -70)}),
-    ("signed distance", phi),
-    ("the offset of 0.5", offset),
 )
 
 # %%

@@ -27,7 +27,7 @@ cases = {
 figure, axes = plt.subplots(1, 3, figsize=(13, 4.5), layout="constrained")
 lengths = []
 for panel, (title, (mesh, sources)) in zip(axes, cases.items(), strict=True):
-    phi = sh.piecewise_distance(mesh, sources)
+    phi = sh.piecewise_distance(sources, mesh)
     cut = phi.cut[0]
     lengths.append(cut.length)
     print(f"{title}: {phi.diagnostics.note(Jumps).gap:.1%} from the least objective at most; {cut}")

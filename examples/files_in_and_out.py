@@ -20,7 +20,7 @@ sh.io.write_vdb(sdf, "ball.vdb")
 view.save_scene(ball, "ball.png")
 
 square = sh.Polyline([[5.0, 55.0], [5.0, 5.0], [55.0, 5.0], [55.0, 55.0]], closed=True)
-sh.io.write_polylines("square.svg", square)
+sh.io.write_polylines(square, "square.svg")
 from_square = sh.signed_distance(sh.io.read_polylines("square.svg"), resolution=64)
 
 globe = samples.sphere(3)
@@ -28,7 +28,7 @@ Path("coast.csv").write_text(
     "x,y,z\n.57,-.81,-.1\n.69,-.58,-.42\n.93,.16,-.34\n.91,.33,.26\n\n.93,.16,.34\n.75,-.43,.5\n.5,-.86,.1\n"
 )
 coast = sh.io.read_curves("coast.csv", globe)
-sh.io.write_curves("whole.json", sh.close_curves(globe, coast), globe)
+sh.io.write_curves(sh.close_curves(coast, globe), "whole.json", globe)
 along = sh.signed_distance(sh.io.read_curves("whole.json", globe), globe)
 
 labels = np.zeros((40, 40, 40), dtype=np.uint8)
@@ -36,11 +36,13 @@ labels[np.linalg.norm(np.indices(labels.shape) - 20.0, axis=0) < 15] = 3
 np.save("labels.npy", labels)
 organ = sh.io.read_labels("labels.npy")
 view.save_row(
+    [
+        ("ball.ply, in millimetres", sdf, {"across": (1,), "levels": [2.54]}),
+        ("square.svg", from_square, {"shape": square}),
+        ("coast.csv", along, {"sources": coast, "view": np.array([0.9, -0.4, 0.2])}),
+        ("labels.npy", organ.to_world(organ.surface(3))),
+    ],
     "files_in_and_out.png",
-    ("ball.ply, in millimetres", sdf, {"across": (1,), "levels": [2.54]}),
-    ("square.svg", from_square, {"shape": square}),
-    ("coast.csv", along, {"sources": coast, "view": np.array([0.9, -0.4, 0.2])}),
-    ("labels.npy", organ.to_world(organ.surface(3))),
 )
 
 # %%

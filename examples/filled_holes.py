@@ -40,7 +40,7 @@ surface_uv[on] = np.einsum("nk,nkd->nd", found.barycentric[on], corners)
 parts = [sh.TriangleMesh(filled.vertices, filled.faces[new_groups != 2]), filled, surface]
 titles = "in: five holes", "every face, and new ones", "watertight"
 around = [{"view": (40, -58)}] * 3
-view.save_row("filled_holes.png", *zip(titles, parts, around, strict=True))
+view.save_row(zip(titles, parts, around, strict=True), "filled_holes.png")
 
 # %%
 # Its volume beside that of the shape before it had holes:

@@ -20,10 +20,12 @@ slice_grid = sh.Grid((-1.7, -1.7), 0.02, (171, 171))
 x, y = np.moveaxis(slice_grid.points, -1, 0)
 values = band(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)).reshape(x.shape)
 view.save_row(
+    [
+        ("in: three holes", broken),
+        ("fine to the thin lines, coarse beyond", sh.GridField(slice_grid, values), {"levels": [-0.12, 0.12]}),
+        ("out: closed", surface),
+    ],
     "fine_band.png",
-    ("in: three holes", broken),
-    ("fine to the thin lines, coarse beyond", sh.GridField(slice_grid, values), {"levels": [-0.12, 0.12]}),
-    ("out: closed", surface),
 )
 ring = np.hypot(surface.vertices[:, 0], surface.vertices[:, 1]) - 1.0
 

@@ -33,10 +33,8 @@ for _ in range(STEPS):
 
 fitted = sh.TriangleMesh(vertices.detach().numpy(), start.faces)
 view.save_row(
+    [("it starts as a ball", start), (f"after {STEPS} steps", fitted), ("what was measured", hidden)],
     "fit_to_distances.png",
-    ("it starts as a ball", start),
-    (f"after {STEPS} steps", fitted),
-    ("what was measured", hidden),
 )
 
 # %%

@@ -42,7 +42,7 @@ phi = sh.signed_distance(north, floor)
 
 phi.save("floor_plan.ply")
 above = {"sources": [north], "view": np.array([0.0, 0.0, 1.0])}
-view.save_row("floor_plan.png", ("distance from the north wall, in metres", phi, above))
+view.save_row([("distance from the north wall, in metres", phi, above)], "floor_plan.png")
 
 # %%
 # Straight from the wall to the post of the middle door, at (11, 6), and on to a place in a corner of the room:

@@ -22,7 +22,7 @@ changed = {
 for title, surface in changed.items():
     sh.save(surface, f"{title.split()[0]}.stl")
     assert surface.to_trimesh().is_watertight
-view.save_row("grow_and_shrink.png", ("in: three holes", duck), *changed.items())
+view.save_row([("in: three holes", duck), *changed.items()], "grow_and_shrink.png")
 
 # %%
 # Mean distance of the eroded surface from the duck:

@@ -13,10 +13,12 @@ wall.save("hollow.stl")
 
 grid = sh.Grid.around(wall.bounds, resolution=56, padding=0.15)
 view.save_row(
+    [
+        ("in: holes", scan),
+        ("out: distance to the wall", sh.signed_distance(wall, grid), {"across": (1,)}),
+        ("out: from outside", wall),
+    ],
     "hollow_model.png",
-    ("in: holes", scan),
-    ("out: distance to the wall", sh.signed_distance(wall, grid), {"across": (1,)}),
-    ("out: from outside", wall),
 )
 area = 0.5 * wall.face_areas.sum()
 

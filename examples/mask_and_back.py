@@ -21,10 +21,12 @@ phi = sh.signed_distance(voxels.smooth_surface, grid)
 grown = sh.DigitalSurface(phi.values < 1.0, spacing=spacing)
 
 view.save_row(
+    [
+        ("in: a mask, slices of 1.6 mm", voxels, {"view": (25, -50)}),
+        ("distance in the same space", phi, {"shape": voxels.smooth_surface, "across": (2,), "levels": [1.0]}),
+        ("out: the mask 1 mm larger", grown, {"view": (25, -50)}),
+    ],
     "mask_and_back.png",
-    ("in: a mask, slices of 1.6 mm", voxels, {"view": (25, -50)}),
-    ("distance in the same space", phi, {"shape": voxels.smooth_surface, "across": (2,), "levels": [1.0]}),
-    ("out: the mask 1 mm larger", grown, {"view": (25, -50)}),
 )
 
 # %%

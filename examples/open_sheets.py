@@ -28,10 +28,12 @@ table = samples.union(
 phi = sh.signed_distance(table, resolution=72, padding=0.4)
 
 view.save_row(
+    [
+        ("in: boards without thickness", table, {"view": (20, -60)}),
+        ("distance: outside on both sides", phi, {"shape": table, "across": (1,), "levels": [0.12]}),
+        ("out: 0.12 around", phi.offset(0.12), {"view": (20, -60)}),
+    ],
     "open_sheets.png",
-    ("in: boards without thickness", table, {"view": (20, -60)}),
-    ("distance: outside on both sides", phi, {"shape": table, "across": (1,), "levels": [0.12]}),
-    ("out: 0.12 around", phi.offset(0.12), {"view": (20, -60)}),
 )
 
 # %%

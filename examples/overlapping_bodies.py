@@ -13,10 +13,12 @@ solid = sh.complete(shape)
 given, united = sh.sharpen(sh.SignedHeatSolver(grid).distance(shape)), solid.field(grid=grid)
 
 view.save_row(
+    [
+        ("two balls, one mesh", shape),
+        ("as they were given", given, {"shape": shape, "across": (1,)}),
+        ("the solid, and the faces that bound it", united, {"shape": solid.faces, "across": (1,)}),
+    ],
     "overlapping_bodies.png",
-    ("two balls, one mesh", shape),
-    ("as they were given", given, {"shape": shape, "across": (1,)}),
-    ("the solid, and the faces that bound it", united, {"shape": solid.faces, "across": (1,)}),
 )
 
 # %%

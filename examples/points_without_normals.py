@@ -12,10 +12,12 @@ phi = sh.signed_distance(cloud, resolution=52)
 surface = phi.contour()
 
 view.save_row(
+    [
+        ("in: 3000 points", cloud, {"view": (40, -58)}),
+        ("signed distance", phi, {"shape": cloud, "across": (2,)}),
+        ("out: closed", surface, {"view": (40, -58)}),
+    ],
     "points_without_normals.png",
-    ("in: 3000 points", cloud, {"view": (40, -58)}),
-    ("signed distance", phi, {"shape": cloud, "across": (2,)}),
-    ("out: closed", surface, {"view": (40, -58)}),
 )
 
 # %%

@@ -23,10 +23,12 @@ part = drained.contour()
 part.save("bowl.stl")
 
 view.save_row(
+    [
+        ("in: an open sheet", bowl, {"view": (35, -58)}),
+        ("its wall, with a drain hole", drained, {"shape": bowl, "across": (1,)}),
+        ("out: closed, 0.12 thick, from below", part, {"view": (-40, -58)}),
+    ],
     "print_shell.png",
-    ("in: an open sheet", bowl, {"view": (35, -58)}),
-    ("its wall, with a drain hole", drained, {"shape": bowl, "across": (1,)}),
-    ("out: closed, 0.12 thick, from below", part, {"view": (-40, -58)}),
 )
 
 # %%

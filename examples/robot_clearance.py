@@ -35,10 +35,12 @@ flat = sh.Grid(phi.grid.origin[:2], phi.grid.spacing[:2], phi.grid.shape[:2])
 points = np.insert(flat.points.reshape(-1, 2), 2, 0.0, axis=1)
 plane = sh.GridField(flat, phi(points).reshape(flat.shape))
 view.save_row(
+    [
+        ("the scan", scan, {"view": (60, -70)}),
+        (f"before: clearance {phi(start).min():.2f}", plane, {"shape": sh.Polyline(start[:, :2]), "levels": [RADIUS]}),
+        (f"after: clearance {phi(path).min():.2f}", plane, {"shape": sh.Polyline(path[:, :2]), "levels": [RADIUS]}),
+    ],
     "robot_clearance.png",
-    ("the scan", scan, {"view": (60, -70)}),
-    (f"before: clearance {phi(start).min():.2f}", plane, {"shape": sh.Polyline(start[:, :2]), "levels": [RADIUS]}),
-    (f"after: clearance {phi(path).min():.2f}", plane, {"shape": sh.Polyline(path[:, :2]), "levels": [RADIUS]}),
 )
 
 # %%

@@ -19,9 +19,11 @@ forms = {
 fields = {name: sh.signed_distance(form, resolution=48) for name, form in forms.items()}
 
 view.save_row(
+    [
+        ("a trimesh.Trimesh", sh.as_shape(part)),
+        *((f"from {name}", field, {"across": (1,)}) for name, field in list(fields.items())[:2]),
+    ],
     "shapes_of_other_packages.png",
-    ("a trimesh.Trimesh", sh.as_shape(part)),
-    *((f"from {name}", field, {"across": (1,)}) for name, field in list(fields.items())[:2]),
 )
 first = fields["trimesh"].values
 

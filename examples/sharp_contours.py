@@ -28,7 +28,7 @@ array = sh.contour(part(places.reshape(-1, 3)).reshape(places.shape[:3]), bounds
 
 titles = "marching cubes", "of an array, sharp", "of the function, sharp"
 around = [{"view": (35, -60)}] * 3
-view.save_row("sharp_contours.png", *zip(titles, (rounded, array, sharp), around, strict=True))
+view.save_row(zip(titles, (rounded, array, sharp), around, strict=True), "sharp_contours.png")
 
 # %%
 # Largest distance of the corners of the plate at the right from the sharp surface:

@@ -45,7 +45,7 @@ for title, phi in cases.items():
     error = 100 * np.sqrt(np.mean((phi.values - exact) ** 2)) / np.ptp(exact)
     print(f"{title}: {error:.3f} % of the range")
     panels.append((f"{title}: error {error:.3f} %", phi, look))
-view.save_row("sharpened_distance.png", *panels)
+view.save_row(panels, "sharpened_distance.png")
 
 # %%
 # per cent of the range: root mean square of the sharpened error:

@@ -20,8 +20,8 @@ shown = {
     "difference, width 0.2": sh.morphology.smooth_difference(ball, ring, 0.2),
 }
 view.save_row(
+    ((title, field.contour(), {"view": (30, -60)}) for title, field in shown.items()),
     "smooth_blends.png",
-    *((title, field.contour(), {"view": (30, -60)}) for title, field in shown.items()),
 )
 
 # %%

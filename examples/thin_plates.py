@@ -18,10 +18,12 @@ offset = phi.offset(0.2)
 away = np.abs(offset.vertices) - half
 exact = np.linalg.norm(np.maximum(away, 0), axis=1) + np.minimum(away.max(axis=1), 0)
 view.save_row(
+    [
+        ("a plate, 0.02 thick", sh.as_shape(plate)),
+        ("distance at nodes 0.08 apart", phi, {"shape": sh.as_shape(plate), "across": (1,), "levels": [0.2]}),
+        ("its offset of 0.2", offset),
+    ],
     "thin_plates.png",
-    ("a plate, 0.02 thick", sh.as_shape(plate)),
-    ("distance at nodes 0.08 apart", phi, {"shape": sh.as_shape(plate), "across": (1,), "levels": [0.2]}),
-    ("its offset of 0.2", offset),
 )
 
 # %%

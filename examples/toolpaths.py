@@ -19,7 +19,7 @@ drawing = [sh.Polyline([a + s, b - s]) for a, b, s in zip(CORNERS, ends, steps, 
 phi = sh.signed_distance(drawing, resolution=200, padding=0.2)
 levels = [-0.12 - 0.18 * k for k in range(4)]
 paths = [line for level in levels for line in phi.contour(level)]
-sh.io.write_polylines("paths.svg", paths)
+sh.io.write_polylines(paths, "paths.svg")
 
 figure = view.new_figure(11.5, 4.2)
 for k, (title, lines) in enumerate([("the drawing, with gaps", drawing), (f"{len(paths)} paths", paths)]):

@@ -15,11 +15,13 @@ plain, mended = sh.sharpen(sh.SignedHeatSolver(grid).distance(shape)), sh.signed
 turned = sh.orientation(shape).turned_faces
 
 view.save_row(
+    [
+        ("half of the faces turned (red)", shape),
+        (f"sh.orient: {turned} turned back", sh.orient(shape)),
+        ("as they were given", plain, {"shape": shape, "across": (1,)}),
+        ("signed_distance", mended, {"shape": shape, "across": (1,)}),
+    ],
     "turned_faces.png",
-    ("half of the faces turned (red)", shape),
-    (f"sh.orient: {turned} turned back", sh.orient(shape)),
-    ("as they were given", plain, {"shape": shape, "across": (1,)}),
-    ("signed_distance", mended, {"shape": shape, "across": (1,)}),
 )
 
 # %%

@@ -24,9 +24,11 @@ agreeing = sh.signed_distance(sh.orient(drawn, mesh), mesh, as_oriented=True)
 
 eye = np.array([0.5, -0.6, 0.6])
 view.save_row(
+    [
+        ("every third piece turned", given, {"sources": drawn, "view": eye}),
+        (f"{found.turned.sum()} turned back", agreeing, {"sources": found.curves, "view": eye}),
+    ],
     "turned_pieces.png",
-    ("every third piece turned", given, {"sources": drawn, "view": eye}),
-    (f"{found.turned.sum()} turned back", agreeing, {"sources": found.curves, "view": eye}),
 )
 whole = sh.signed_distance(mesh.polyline(wave[:-1], closed=True), mesh).values
 

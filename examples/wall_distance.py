@@ -32,9 +32,11 @@ inlet = channel.polyline([[0.05, 1.1, 0.0], [0.05, 0.15, 0.0]])
 from_inlet = sh.signed_distance(inlet, channel)
 
 view.save_row(
+    [
+        ("to the nearest wall", free),
+        ("from the inlet, round the blocks", from_inlet, {"sources": [inlet], "view": np.array([0.0, 0.0, 1.0])}),
+    ],
     "wall_distance.png",
-    ("to the nearest wall", free),
-    ("from the inlet, round the blocks", from_inlet, {"sources": [inlet], "view": np.array([0.0, 0.0, 1.0])}),
 )
 
 # %%

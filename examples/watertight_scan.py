@@ -17,10 +17,12 @@ closed.save("part.stl")
 confidence = sh.GridField(phi.grid, phi.values.clip(max=0.3))
 
 view.save_row(
+    [
+        ("in: holes, noise, turned faces", scan, {"view": (40, -58)}),
+        ("signed distance", confidence, {"shape": scan, "across": (2,)}),
+        ("out: closed", closed, {"view": (40, -58)}),
+    ],
     "watertight_scan.png",
-    ("in: holes, noise, turned faces", scan, {"view": (40, -58)}),
-    ("signed distance", confidence, {"shape": scan, "across": (2,)}),
-    ("out: closed", closed, {"view": (40, -58)}),
 )
 
 # %%

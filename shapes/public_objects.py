@@ -116,7 +116,7 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "tet field": lambda: sh.SignedHeatSolver(BOX).distance(INNER),
     "grid field": lambda: sh.SignedHeatSolver(grid()).distance(BALL),
     "solid": lambda: sh.signed_distance(BALL, resolution=16),
-    "piecewise field": lambda: sh.piecewise_distance(BALL, BALL.path([0, 5])),
+    "piecewise field": lambda: sh.piecewise_distance(BALL.path([0, 5]), BALL),
     "orientation": lambda: sh.orientation(BALL),
     "deviation": lambda: sh.deviation(samples.sphere(1, 1.1), BALL),
     "completed solid": lambda: sh.complete(samples.without_patches(samples.sphere(2), 2, 0.2)),

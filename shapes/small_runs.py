@@ -39,9 +39,9 @@ def runs() -> dict[str, np.ndarray]:
     ring = ball.polyline(np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1))  # where ways and cuts tie
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sh.errors.InexactWarning)  # half of the ring is gone: what it bounds is a guess
-        closed = sh.close_curves(ball, ring)
+        closed = sh.close_curves(ring, ball)
     lines = [
-        *sh.close_curves(ball, stroke),
+        *sh.close_curves(stroke, ball),
         *closed,
         *ball.level_set(ball.vertices[:, 2]),
         *surface.contour(0.1),

@@ -126,8 +126,9 @@ def test_thicken(arguments, keywords, error):
     ],
 )
 def test_piecewise_distance(arguments, keywords, error):
+    domain, sources = arguments
     with refused(error):
-        sh.piecewise_distance(*arguments, **keywords)
+        sh.piecewise_distance(sources, domain, **keywords)
 
 
 @pytest.mark.parametrize(
@@ -155,8 +156,9 @@ def test_piecewise_distance(arguments, keywords, error):
     ],
 )
 def test_close_curves(arguments, keywords, error):
+    domain, sources = arguments
     with refused(error):
-        sh.close_curves(*arguments, **keywords)
+        sh.close_curves(sources, domain, **keywords)
 
 
 SOLID = sh.complete(BALL)
@@ -204,7 +206,7 @@ def test_words_are_those_of_a_list(call, name):
     [
         *((lambda **flags: sh.complete(BALL, **flags), name) for name in ("as_oriented", "keep_overlaps")),
         *((lambda **flags: sh.signed_distance(RING, BALL, **flags), name) for name in ("as_oriented", "every_piece")),
-        *((lambda **flags: sh.close_curves(BALL, RING, **flags), name) for name in ("as_oriented", "every_piece")),
+        *((lambda **flags: sh.close_curves(RING, BALL, **flags), name) for name in ("as_oriented", "every_piece")),
         *((lambda **flags: SOLID.surface(resolution=8, **flags), name) for name in ("sharp", "keep_faces")),
         (lambda **flags: sh.intrinsic_delaunay(BALL, **flags), "refine"),
     ],
@@ -230,7 +232,7 @@ ROUND = np.linalg.norm(GRID.points, axis=-1) - 1
         case("a TriangleMesh cannot be sharpened", BALL, error=sh.errors.UnsupportedTypeError),
         case(
             "a PiecewiseField cannot be sharpened",
-            sh.piecewise_distance(BALL, RING),
+            sh.piecewise_distance(RING, BALL),
             error=sh.errors.UnsupportedTypeError,
         ),
         case("cannot be sharpened", sh.GridField(GRID, with_one(ROUND, INF)), error=sh.errors.GeometryError),
@@ -289,8 +291,8 @@ def test_methods(make):
 @pytest.fixture
 def folder(tmp_path):
     BALL.save(tmp_path / "ball.ply")
-    sh.io.write_curves(tmp_path / "ring.json", RING, BALL)
-    sh.io.write_curves(tmp_path / "points.json", [BALL.points_at([3])], BALL)
+    sh.io.write_curves(RING, tmp_path / "ring.json", BALL)
+    sh.io.write_curves([BALL.points_at([3])], tmp_path / "points.json", BALL)
     for name in ("ball.ply", "ring.json"):
         whole = (tmp_path / name).read_bytes()
         (tmp_path / f"cut-{name}").write_bytes(whole[: len(whole) * 2 // 3])

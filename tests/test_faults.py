@@ -39,8 +39,8 @@ WRITERS = {
     **{f"surface.{ending}": ON_BALL.save for ending in ("npz", "ply", "vtp", "obj")},
     **{f"tets.{ending}": TETS.save for ending in ("node", "ele", "mesh", "msh", "vtk", "vtu")},
     **{f"values.{ending}": ON_TETS.save for ending in ("msh", "vtk", "vtu")},
-    **{f"lines.{ending}": lambda path: sh.io.write_polylines(path, LINE) for ending in ("svg", "csv")},
-    **{f"curves.{ending}": lambda path: sh.io.write_curves(path, CURVE, BALL) for ending in ("txt", "json", "obj")},
+    **{f"lines.{ending}": lambda path: sh.io.write_polylines(LINE, path) for ending in ("svg", "csv")},
+    **{f"curves.{ending}": lambda path: sh.io.write_curves(CURVE, path, BALL) for ending in ("txt", "json", "obj")},
     **{f"picture.{ending}": lambda path: save_scene(BALL, path) for ending in ("png", "svg")},
 }
 """Everything that writes a file, by the end of its name."""
@@ -207,7 +207,7 @@ def test_environments_that_make_no_sense(tmp_path, variables):
     ready(tmp_path)
     command = ["-m", "signedheat", "surface", "ball.stl", "curve.json", "-o", "phi.ply"]
     sh.io.write_curves(
-        tmp_path / "curve.json", sh.read(tmp_path / "ball.stl").path([0, 1, 2]), sh.read(tmp_path / "ball.stl")
+        sh.read(tmp_path / "ball.stl").path([0, 1, 2]), tmp_path / "curve.json", sh.read(tmp_path / "ball.stl")
     )
     environment = {**os.environ, **variables}
     done = subprocess.run([sys.executable, *command], cwd=tmp_path, env=environment, capture_output=True, text=True)

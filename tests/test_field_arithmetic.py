@@ -24,7 +24,7 @@ def field(kind):
         mesh = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
         return sh.TetField(mesh, mesh.vertices[:, 2] - 0.3)
     curve = ball.path(np.flatnonzero(np.abs(ball.vertices[:, 2]) < 0.05)[:2])
-    solver = {"vertices": sh.SignedHeatSolver(ball).distance, "piecewise": lambda c: sh.piecewise_distance(ball, c)}
+    solver = {"vertices": sh.SignedHeatSolver(ball).distance, "piecewise": lambda c: sh.piecewise_distance(c, ball)}
     return solver[kind](curve)
 
 

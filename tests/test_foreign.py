@@ -78,8 +78,8 @@ TAKERS = {
     "tetrahedralize": lambda shape: sh.tetrahedralize(shape, resolution=2).vertices,
     "domain": lambda shape: sh.SignedHeatSolver(shape).distance(BALL.points_at(0)).values,
     "signed_distance of curves": lambda shape: sh.signed_distance(RING, shape).values,
-    "piecewise_distance": lambda shape: sh.piecewise_distance(shape, RING).values,
-    "close_curves": lambda shape: sh.close_curves(shape, ARCS)[0].barycentric,
+    "piecewise_distance": lambda shape: sh.piecewise_distance(RING, shape).values,
+    "close_curves": lambda shape: sh.close_curves(ARCS, shape)[0].barycentric,
     "orient curves": lambda shape: sh.orient(ARCS, shape)[1].faces,
     "intrinsic_delaunay": lambda shape: sh.intrinsic_delaunay(shape).triangles.edge_lengths,
     "transform": lambda shape: sh.transform(shape, np.diag([2.0, 1, -1, 1])).faces,
@@ -99,12 +99,12 @@ def test_they_are_saved_and_drawn_and_hold_the_curves_of_files(tmp_path):
     for name, given in {"own": BALL, "trimesh": BALL.to_trimesh(), "arrays": (BALL.vertices, BALL.faces)}.items():
         sh.save(given, tmp_path / f"{name}.ply")
         assert np.array_equal(sh.read(tmp_path / f"{name}.ply").faces, BALL.faces)
-        sh.io.write_curves(tmp_path / f"{name}.json", ARCS, given)
+        sh.io.write_curves(ARCS, tmp_path / f"{name}.json", given)
         again = sh.io.read_curves(tmp_path / f"{name}.json", given)
         assert np.abs(places_of(again[1]) - places_of(ARCS[1])).max() < 1e-12
         view.save_scene(given, tmp_path / f"{name}.png")
         view.save_slices(field, tmp_path / f"{name}-slices.png", given)
-        view.save_row(tmp_path / f"{name}-row.png", ("ball", given))
+        view.save_row([("ball", given)], tmp_path / f"{name}-row.png")
         pictures[name] = [(tmp_path / f"{name}{end}.png").read_bytes() for end in ("", "-slices", "-row")]
     assert pictures["own"] == pictures["trimesh"] == pictures["arrays"]
     for take in (

@@ -201,7 +201,7 @@ def test_piecewise_fields_that_do_not_fit_name_a_number_of_triangles_that_does(m
     for surface in (BALL, sh.PolygonMesh(BALL.vertices, BALL.faces), sh.intrinsic_delaunay(BALL)):
         monkeypatch.setattr(memory, "_free", lambda: free)
         with refused(sh.errors.MemoryLimitError) as caught:
-            sh.piecewise_distance(surface, half)
+            sh.piecewise_distance(half, surface)
         fitting = int(caught.value.remedy.split()[3].replace(",", ""))
         room = (free - memory.libraries()) / memory.REMEDY_MARGIN
         assert piecewise_estimate(fitting) <= room < piecewise_estimate(fitting + 1)

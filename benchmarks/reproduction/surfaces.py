@@ -141,7 +141,7 @@ def curves_that_bound_nothing(page: Page) -> None:
     picture = new_figure(15, 4.6)
     for k, (name, (mesh, curves)) in enumerate(cases.items()):
         continuous = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False).distance(curves, sh.constraints.Free())
-        field = sh.piecewise_distance(mesh, curves)
+        field = sh.piecewise_distance(curves, mesh)
         slopes = [
             float(np.mean(np.abs(1 - np.linalg.norm(gradient, axis=1))))
             for gradient in (continuous.face_gradients, field.split().face_gradients)
@@ -207,7 +207,7 @@ def drawn_on_higher_genus(page: Page) -> None:
     mesh = shapes.subdivided(shapes.organic(3, 500, handles=1), 1)
     heights = shapes.height(mesh.vertices, 3)
     strokes = shapes.pieces(mesh, heights, 0.4, 5)
-    closed = sh.close_curves(mesh, strokes)
+    closed = sh.close_curves(strokes, mesh)
     solver = sh.SignedHeatSolver(mesh, 1.0, intrinsic=False)
     exact = sh.sharpen(solver.distance(mesh.level_set(heights, 0.0)))
     away = np.concatenate([np.abs(exact(curve)) for curve in closed])

@@ -36,8 +36,8 @@ def arcs(tmp_path):
     angle = -2 * np.pi * np.arange(120) / 120
     points = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     lines = [sh.Polyline(points[k : k + 32]) for k in (0, 40, 80)]
-    sh.io.write_polylines(tmp_path / "arcs.csv", lines)
-    sh.io.write_polylines(tmp_path / "arcs.svg", lines)
+    sh.io.write_polylines(lines, tmp_path / "arcs.csv")
+    sh.io.write_polylines(lines, tmp_path / "arcs.svg")
     return tmp_path
 
 
@@ -114,7 +114,7 @@ def test_drawings(tmp_path):
 def test_polylines_come_back_to_the_last_bit(tmp_path, ending):
     rng = np.random.default_rng(3)
     lines = [sh.Polyline(rng.normal(size=(n, 2)), closed=n > 3) for n in (2, 5, 9)]
-    sh.io.write_polylines(tmp_path / f"lines.{ending}", lines)
+    sh.io.write_polylines(lines, tmp_path / f"lines.{ending}")
     again = sh.io.read_polylines(tmp_path / f"lines.{ending}")
     for line, other in zip(lines, again, strict=True):
         np.testing.assert_array_equal(line.points, other.points)
@@ -184,7 +184,7 @@ def test_close_completes_curves(ball, capsys):
     assert "1 curve, 1 of them closed" in text
     mesh = sh.read(ball / "ball.ply")
     [whole] = sh.io.read_curves(out, mesh)
-    [wanted] = sh.close_curves(mesh, sh.io.read_curves(ball / "half.csv", mesh))
+    [wanted] = sh.close_curves(sh.io.read_curves(ball / "half.csv", mesh), mesh)
     points, others = (
         np.einsum("ik,ikj->ij", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]]) for curve in (whole, wanted)
     )

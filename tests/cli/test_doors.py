@@ -186,7 +186,7 @@ def test_info_of_a_solid_says_that_nothing_is_left_to_mend(tmp_path, ball, capsy
 def test_curves_lie_on_the_surface_of_a_solid(tmp_path, capsys):
     solid = sh.complete(samples.sphere(2))
     solid.save(tmp_path / "ball.npz")
-    sh.io.write_curves(tmp_path / "curve.json", [solid.boundary.path([0, 9])], solid.boundary)
+    sh.io.write_curves([solid.boundary.path([0, 9])], tmp_path / "curve.json", solid.boundary)
     names = [str(tmp_path / name) for name in ("ball.npz", "curve.json", "phi.vtp")]
     assert main(["surface", *names[:2], "-o", names[2], "--quiet"]) == 0
     assert sh.load_field(names[2]).values.shape == (len(solid.boundary.vertices),)

@@ -20,7 +20,7 @@ def files(tmp_path):
     mesh.save(tmp_path / "ball.ply")
     curve = mesh.level_set(mesh.vertices[:, 2], 0.2)[0]
     half = sh.Curve(curve.faces[:60], curve.barycentric[:60])
-    sh.io.write_curves(tmp_path / "curves.json", [half, mesh.path([0, 30])], mesh)
+    sh.io.write_curves([half, mesh.path([0, 30])], tmp_path / "curves.json", mesh)
     return tmp_path
 
 
@@ -49,7 +49,7 @@ def test_json_contours_and_a_picture(files, capsys):
 def test_vertices_that_no_curve_reaches_are_told_on_standard_error(tmp_path, capsys):
     mesh = square(5)
     samples.union(mesh, sh.TriangleMesh(mesh.vertices + 5, mesh.faces)).save(tmp_path / "two.ply")
-    sh.io.write_curves(tmp_path / "curve.json", [mesh.path([10, 11, 12, 13, 14])], mesh)
+    sh.io.write_curves([mesh.path([10, 11, 12, 13, 14])], tmp_path / "curve.json", mesh)
     command = ["surface", str(tmp_path / "two.ply"), str(tmp_path / "curve.json"), "-o", str(tmp_path / "phi.npz")]
     assert main([*command, "--quiet"]) == 0
     said = capsys.readouterr().err
@@ -67,7 +67,7 @@ def test_info_says_what_lies_where(tmp_path, capsys):
     mesh = square(6)
     mesh.save(tmp_path / "flat.ply")
     curves = [mesh.path([7, 8, 20]), mesh.path([21, 22, 16, 15], closed=True), mesh.points_at([0])]
-    sh.io.write_curves(tmp_path / "curves.json", curves, mesh)
+    sh.io.write_curves(curves, tmp_path / "curves.json", mesh)
     assert main(["info", str(tmp_path / "flat.ply"), str(tmp_path / "curves.json"), "--json"]) == 0
     first, second, third = json.loads(capsys.readouterr().out)["curves"]
     assert first["share_no_face"] == [1] and first["open_ends"] == ["vertex 7", "vertex 20"]
@@ -102,7 +102,7 @@ def test_turned_pieces_are_told_and_left_with_as_oriented(tmp_path, capsys):
     runs = [np.arange(a, b - 3) for a, b in pairwise(cuts)]
     pieces = [sh.Curve(ring.faces[run], ring.barycentric[run]) for run in runs]
     mesh.save(tmp_path / "ball.ply")
-    sh.io.write_curves(tmp_path / "pieces.json", [pieces[0], pieces[1].reversed(), *pieces[2:]], mesh)
+    sh.io.write_curves([pieces[0], pieces[1].reversed(), *pieces[2:]], tmp_path / "pieces.json", mesh)
     arguments = ["surface", str(tmp_path / "ball.ply"), str(tmp_path / "pieces.json"), "-o", str(tmp_path / "phi.ply")]
     assert main([*arguments, "--json"]) == 0
     summary = json.loads(capsys.readouterr().out)
@@ -116,7 +116,7 @@ def test_turned_pieces_are_told_and_left_with_as_oriented(tmp_path, capsys):
 def test_a_refined_field_is_written_on_its_pieces(tmp_path):
     square(3).save(tmp_path / "square.ply")
     mesh = sh.read(tmp_path / "square.ply")
-    sh.io.write_curves(tmp_path / "line.json", mesh.polyline([[0.3, 0.2, 0], [0.4, 0.6, 0]]), mesh)
+    sh.io.write_curves(mesh.polyline([[0.3, 0.2, 0], [0.4, 0.6, 0]]), tmp_path / "line.json", mesh)
     arguments = ["surface", str(tmp_path / "square.ply"), str(tmp_path / "line.json"), "--intrinsic"]
     for name, options in (("own", []), ("pieces", ["--subdivide", "--preview", str(tmp_path / "p.png"), "--up", "y"])):
         assert main([*arguments, "-o", str(tmp_path / f"{name}.npz"), *options]) == 0

@@ -20,7 +20,7 @@ def circle(radius: float, begin: float = 0.0, end: float = 2 * np.pi, n: int = 4
 @pytest.mark.parametrize("radius", [0.3, 1.2])
 def test_closed_curves_smaller_than_the_triangles_come_back(radius):
     mesh = box((0, 0, 0), (6, 4, 1))
-    found = sh.close_curves(mesh, mesh.polyline(circle(radius), closed=True))
+    found = sh.close_curves(mesh.polyline(circle(radius), closed=True), mesh)
     assert len(found) == 1 and found[0].closed
     places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
     assert np.abs(np.linalg.norm(places - [3.4, 1.9, 1.0], axis=1) - radius).max() < 0.01 * radius
@@ -28,7 +28,7 @@ def test_closed_curves_smaller_than_the_triangles_come_back(radius):
 
 def test_a_gap_is_closed():
     mesh = box((0, 0, 0), (6, 4, 1))
-    found = sh.close_curves(mesh, mesh.polyline(circle(1.2, 0.4, 6.0)))
+    found = sh.close_curves(mesh.polyline(circle(1.2, 0.4, 6.0)), mesh)
     assert len(found) == 1 and found[0].closed
     places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
     assert np.abs(np.linalg.norm(places - [3.4, 1.9, 1.0], axis=1) - 1.2).max() < 0.3
@@ -52,7 +52,7 @@ def test_gaps_of_curves_far_smaller_than_the_triangles_are_closed(radius, seed):
     mesh, center = box((0, 0, 0), (6, 4, 1)), np.array([3.4, 1.9, 1.0])
     angle = np.sort(np.random.default_rng(seed).uniform(0, 2 * np.pi, 28))
     ring = radius * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1) + center
-    found = sh.close_curves(mesh, [mesh.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)])
+    found = sh.close_curves([mesh.polyline(ring[7 * k : 7 * k + 5]) for k in range(4)], mesh)
     assert len(found) == 1 and found[0].closed
     places = np.einsum("ij,ijk->ik", found[0].barycentric, mesh.vertices[mesh.faces[found[0].faces]])
     assert np.abs(np.linalg.norm(places - center, axis=1) / radius - 1).max() < 0.8
@@ -69,7 +69,7 @@ def test_rounding_chooses_between_no_equals(n, gap):
     for size in (0.0, *4 * [1.2e-16]):
         mesh = sh.TriangleMesh(ball.vertices * (1 + size * noise.choice([-1, 0, 1], ball.vertices.shape)), ball.faces)
         stroke = mesh.polyline(ring)
-        counts.append([len(stroke.faces), *(curve.n_points for curve in sh.close_curves(mesh, stroke))])
+        counts.append([len(stroke.faces), *(curve.n_points for curve in sh.close_curves(stroke, mesh))])
         values.append(sh.SignedHeatSolver(mesh, intrinsic=True).distance(stroke).values)
     assert counts[1:] == counts[:-1]
     np.testing.assert_allclose(values[1:], values[:-1], rtol=0, atol=1e-11)

@@ -61,7 +61,7 @@ def test_a_spurious_piece_is_left_out_with_a_note(mesh, pieces):
 
 def test_closing_leaves_it_out_too(mesh, pieces):
     spurious = mesh.polyline([[-0.1, 0.05, 0], [0.2, 0.1, 0]])
-    (whole,) = sh.close_curves(mesh, [pieces[0].reversed(), spurious, *pieces[1:]])
+    (whole,) = sh.close_curves([pieces[0].reversed(), spurious, *pieces[1:]], mesh)
     at = np.einsum("nk,nkd->nd", whole.barycentric, mesh.vertices[mesh.faces[whole.faces]])
     assert whole.closed
     assert np.abs(np.linalg.norm(at, axis=1) - 0.6).max() < 0.05

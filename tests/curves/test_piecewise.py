@@ -52,7 +52,7 @@ def exact_distance(*arguments, **options) -> sh.PiecewiseField:
 def test_fast_is_as_good_as_exact(case):
     mesh, curve = CASES[case]()
     fast, exact = (
-        way(mesh, curve, intrinsic=False).diagnostics.note(Jumps) for way in (sh.piecewise_distance, exact_distance)
+        way(curve, mesh, intrinsic=False).diagnostics.note(Jumps) for way in (sh.piecewise_distance, exact_distance)
     )
     assert exact.gap < 1e-6
     assert exact.objective * (1 - 1e-6) <= fast.objective <= 1.005 * exact.objective
@@ -61,7 +61,7 @@ def test_fast_is_as_good_as_exact(case):
 
 def test_loop_round_the_tube_is_cut_across_the_tube():
     mesh = torus(n_around=64, n_across=24)
-    phi = sh.piecewise_distance(mesh, mesh.path(range(24), closed=True))
+    phi = sh.piecewise_distance(mesh.path(range(24), closed=True), mesh)
     assert len(phi.cut) == 1
     cut = phi.cut[0]
     assert cut.vertices[0] == cut.vertices[-1]
@@ -76,7 +76,7 @@ def test_loop_round_the_tube_is_cut_across_the_tube():
 def test_source_is_cut_only_where_nothing_else_is_possible():
     mesh = torus(n_around=48, n_across=24)  # the inner equator is the shortest loop of all
     ids = np.arange(48) * 24 + 12
-    phi = exact_distance(mesh, mesh.path(ids, closed=True))
+    phi = exact_distance(mesh.path(ids, closed=True), mesh)
     assert len(phi.cut) == 1
     assert not np.isin(phi.cut[0].vertices, ids).any()
 
@@ -84,7 +84,7 @@ def test_source_is_cut_only_where_nothing_else_is_possible():
 def test_gradient_is_one_and_source_is_zero():
     mesh = sphere(4)
     curve = arc(mesh)
-    phi = sh.piecewise_distance(mesh, curve, smooth=False)
+    phi = sh.piecewise_distance(curve, mesh, smooth=False)
     spacing = mesh.edge_lengths.mean()
     assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
     assert np.abs(phi(curve)).max() < spacing
@@ -96,7 +96,7 @@ def test_bounding_curve_equals_plain_distance():
     mesh = sphere(4)
     t = np.linspace(0, 2 * np.pi, 80, endpoint=False)
     circle = mesh.polyline(np.stack([0.9 * np.cos(t), 0.9 * np.sin(t), np.full_like(t, 0.4)], axis=1), closed=True)
-    phi = sh.piecewise_distance(mesh, circle)
+    phi = sh.piecewise_distance(circle, mesh)
     notes = phi.diagnostics.note(Jumps)
     assert notes.continuous and phi.cut == [] and notes.cut_length == 0
     plain = sh.SignedHeatSolver(mesh).distance(circle, sh.constraints.Free())
@@ -119,7 +119,7 @@ def test_orientation_of_faces_does_not_matter():
         across = mesh.path(ids)
         along = np.cross(np.diff(mesh.vertices[ids], axis=0), [0.0, 0.0, 1.0])
         curve = sh.Curve(across.faces, across.barycentric, normals=along)
-        fields.append(exact_distance(mesh, curve))
+        fields.append(exact_distance(curve, mesh))
     assert fields[0].diagnostics.note(Jumps).objective == pytest.approx(
         fields[1].diagnostics.note(Jumps).objective, rel=1e-9
     )
@@ -129,7 +129,7 @@ def test_orientation_of_faces_does_not_matter():
 def test_reversal_changes_the_sign():
     mesh = torus(n_around=40, n_across=20)
     curve = mesh.path(range(20), closed=True)
-    forth, back = (exact_distance(mesh, c, smooth=False) for c in (curve, curve.reversed()))
+    forth, back = (exact_distance(c, mesh, smooth=False) for c in (curve, curve.reversed()))
     assert forth.diagnostics.note(Jumps).objective == pytest.approx(back.diagnostics.note(Jumps).objective, rel=1e-9)
     assert np.allclose(forth.face_gradients, -back.face_gradients)
 
@@ -137,7 +137,7 @@ def test_reversal_changes_the_sign():
 def test_scale():
     mesh, curve = CASES["round the tube"]()
     large = sh.TriangleMesh(1000 * mesh.vertices, mesh.faces)
-    small, scaled = sh.piecewise_distance(mesh, curve), sh.piecewise_distance(large, curve)
+    small, scaled = sh.piecewise_distance(curve, mesh), sh.piecewise_distance(curve, large)
     assert np.allclose(scaled.values, 1000 * small.values, rtol=0, atol=1e-3)
 
 
@@ -146,7 +146,7 @@ def test_inconsistently_oriented_curve():
     mesh = sphere(4)
     t = np.linspace(0, np.pi, 60)
     halves = [mesh.polyline(np.stack([np.cos(t), s * np.sin(t), 0 * t], axis=1)) for s in (1, -1)]
-    phi = sh.piecewise_distance(mesh, halves)
+    phi = sh.piecewise_distance(halves, mesh)
     assert not phi.diagnostics.note(Jumps).continuous
     ends = np.concatenate([c.points for c in phi.cut])
     assert min(np.linalg.norm(ends - [1, 0, 0], axis=1).min(), np.linalg.norm(ends - [-1, 0, 0], axis=1).min()) < 0.5
@@ -159,7 +159,7 @@ def test_polygons_equal_triangles():
     mesh = torus(n_around=40, n_across=20)
     polygons = sh.PolygonMesh(mesh.vertices, mesh.faces)
     curve = mesh.path(range(20), closed=True)
-    a, b = sh.piecewise_distance(mesh, curve), sh.piecewise_distance(polygons, curve)
+    a, b = sh.piecewise_distance(curve, mesh), sh.piecewise_distance(curve, polygons)
     assert np.allclose(a.values, b.values, atol=1e-9)
 
 
@@ -168,7 +168,7 @@ def test_quads():
     ids = np.arange(800).reshape(40, 20)
     right, up = np.roll(ids, -1, axis=0), np.roll(ids, -1, axis=1)
     quads = np.stack([ids, right, np.roll(right, -1, axis=1), up], axis=-1).reshape(-1, 4)
-    phi = sh.piecewise_distance(sh.PolygonMesh(mesh.vertices, quads), sh.PolygonMesh(mesh.vertices, quads).path(ids[0]))
+    phi = sh.piecewise_distance(sh.PolygonMesh(mesh.vertices, quads).path(ids[0]), sh.PolygonMesh(mesh.vertices, quads))
     assert phi.surface.n_faces == 4 * len(quads)
     assert phi.cut[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.05)
 
@@ -181,12 +181,12 @@ def test_intrinsic_triangulation_equals_the_mesh():
     h = [discretize(domain).spacing for domain in domains]  # a mean over edges, and over the area
     diffusion = [(h[0] / spacing) ** 2 for spacing in h]
     best = [
-        exact_distance(domain, curve, diffusion=tau).diagnostics.note(Jumps).objective
+        exact_distance(curve, domain, diffusion=tau).diagnostics.note(Jumps).objective
         for domain, tau in zip(domains, diffusion, strict=True)
     ]
     assert best[0] == pytest.approx(best[1], rel=1e-9)  # several fields may reach it
     plain, intrinsic = (
-        sh.piecewise_distance(domain, curve, diffusion=tau) for domain, tau in zip(domains, diffusion, strict=True)
+        sh.piecewise_distance(curve, domain, diffusion=tau) for domain, tau in zip(domains, diffusion, strict=True)
     )
     middle = sh.SurfacePoints(np.arange(mesh.n_faces), np.full((mesh.n_faces, 3), 1 / 3))
     assert np.abs(plain(middle) - intrinsic(middle)).max() < 1e-6
@@ -212,7 +212,7 @@ def test_intrinsic_triangulation_of_a_bad_mesh(refine, tmp_path):
     mesh = bad(torus(n_around=40, n_across=20))
     curve = mesh.path(range(20), closed=True)
     better = sh.intrinsic_delaunay(mesh, keep=curve, refine=refine)
-    phi = sh.piecewise_distance(better, curve)
+    phi = sh.piecewise_distance(curve, better)
     assert phi.diagnostics.note(Jumps).gap < 0.002
     # One loop round the tube, of circumference 0.8 π, with a twig or two at bad triangles. It sits where triangles are
     # longest, and there the way round, from 1.2 π to 2.8 π, is measured with an error of a triangle or so.
@@ -245,7 +245,7 @@ def test_unoriented_curve_across_faces(kind):
     domain = mesh if kind == "triangles" else sh.PolygonMesh(mesh.vertices, mesh.faces)
     if kind == "polygons":
         curve = domain.polyline(np.stack([np.cos(t), np.sin(t), 0.03 + 0 * t], axis=1), oriented=False)
-    phi = sh.piecewise_distance(domain, curve)
+    phi = sh.piecewise_distance(curve, domain)
     assert isinstance(phi.domain, sh.IntrinsicTriangulation)
     assert np.abs(phi(curve)).max() < mesh.edge_lengths.mean()  # at its ends, where slopes turn
     poles = domain.points_at([int(np.argmin(np.linalg.norm(mesh.vertices - [0, 0, s], axis=1))) for s in (1, -1)])
@@ -255,7 +255,7 @@ def test_unoriented_curve_across_faces(kind):
 
 def test_smoothing_takes_small_jumps_away_and_leaves_the_cut():
     mesh, curve = CASES["round the tube"]()
-    rough, smooth = (sh.piecewise_distance(mesh, curve, smooth=smooth) for smooth in (False, True))
+    rough, smooth = (sh.piecewise_distance(curve, mesh, smooth=smooth) for smooth in (False, True))
     small = np.abs(rough.jumps)[~rough.is_cut]
     assert small.max() > 1e-3
     assert np.abs(smooth.jumps)[~smooth.is_cut].max() < 1e-12
@@ -267,7 +267,7 @@ def test_smooth_is_step_three():
     mesh = sphere(3)
     circle = mesh.level_set(mesh.vertices[:, 2], 0.3)
     plain = sh.SignedHeatSolver(mesh, intrinsic=False, diffusion=1.0).distance(circle, sh.constraints.Free()).values
-    smooth = sh.piecewise_distance(mesh, circle, intrinsic=False).split()
+    smooth = sh.piecewise_distance(circle, mesh, intrinsic=False).split()
     assert np.ptp(smooth.values[smooth.domain.faces] - plain[mesh.faces]) < 1e-4
 
 
@@ -280,14 +280,14 @@ def test_smooth_is_nearer_to_the_way_along_a_moebius_strip():
     middle = mesh.points_at(at * 13 + 6)
     errors = []
     for smooth in (False, True):
-        values = sh.piecewise_distance(mesh, curve, smooth=smooth)(middle)
+        values = sh.piecewise_distance(curve, mesh, smooth=smooth)(middle)
         errors.append(np.abs(np.abs(values) - np.abs(way[at])).max())
     assert errors[1] < 0.5 * errors[0] and errors[1] < 0.002
 
 
 def test_save_and_contour_show_the_jump(tmp_path):
     mesh, curve = CASES["round the tube"]()
-    phi = sh.piecewise_distance(mesh, curve)
+    phi = sh.piecewise_distance(curve, mesh)
     split = phi.split()
     assert split.domain.n_vertices == mesh.n_vertices + len(phi.cut[0].vertices) - 1  # the closed cut, doubled
     assert np.array_equal(split.domain.vertices[split.domain.faces], mesh.vertices[mesh.faces])
@@ -303,7 +303,7 @@ def test_parts_without_source_are_nan():
         np.concatenate([mesh.vertices, mesh.vertices + 5]), np.concatenate([mesh.faces, mesh.faces + mesh.n_vertices])
     )
     with pytest.warns(sh.errors.UnreachedWarning):
-        phi = sh.piecewise_distance(both, both.path(range(20), closed=True))
+        phi = sh.piecewise_distance(both.path(range(20), closed=True), both)
     assert np.isnan(phi.values[mesh.n_faces :]).all() and np.isfinite(phi.values[: mesh.n_faces]).all()
     assert np.array_equal(phi.diagnostics.unreached, np.arange(mesh.n_faces, 2 * mesh.n_faces))
     assert len(phi.cut) == 1
@@ -313,7 +313,7 @@ def test_single_face():
     mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     curve = sh.Curve([0, 0], [[0.5, 0.5, 0.0], [0.5, 0.0, 0.5]])
     for way in (sh.piecewise_distance, exact_distance):
-        phi = way(mesh, curve)
+        phi = way(curve, mesh)
         assert np.allclose(phi.values, np.sqrt(0.125) * np.array([1, -1, -1]))
 
 
@@ -330,7 +330,7 @@ def test_nonmanifold_edge():
     pairs = face_pairs(IntrinsicMesh.from_lengths(mesh.faces, np.ones((12, 3)), 14, mesh.edges))
     spine = np.flatnonzero(pairs.shares == 0.5)
     assert len(spine) == 3 and len(np.unique(pairs.faces[spine])) == 3
-    phi = sh.piecewise_distance(mesh, mesh.path([2, 3]))
+    phi = sh.piecewise_distance(mesh.path([2, 3]), mesh)
     assert np.isfinite(phi.values).all()
 
 
@@ -359,21 +359,21 @@ def test_polylines_close_and_end_at_forks():
 def test_bad_options(keywords, error):
     mesh = sphere(1)
     with pytest.raises(error):
-        sh.piecewise_distance(mesh, mesh.path([0, mesh.faces[0, 1]]), **keywords)
+        sh.piecewise_distance(mesh.path([0, mesh.faces[0, 1]]), mesh, **keywords)
 
 
 def test_bad_domain_and_source():
     with refused(TypeError, "domain"):
-        sh.piecewise_distance(sh.PointCloud(np.eye(3)), [])
+        sh.piecewise_distance([], sh.PointCloud(np.eye(3)))
     square = sh.PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])
     with refused(sh.errors.GeometryError, "domain"):  # which has no intrinsic triangulation
-        sh.piecewise_distance(square, square.path([0, 2]), intrinsic=True)
+        sh.piecewise_distance(square.path([0, 2]), square, intrinsic=True)
     mesh = sphere(1)
     with pytest.raises(sh.errors.SourceError):
-        sh.piecewise_distance(mesh, [])
+        sh.piecewise_distance([], mesh)
     across = sh.Curve([0, 0], [[0.2, 0.3, 0.5], [0.5, 0.3, 0.2]], oriented=False)
     with refused(sh.errors.SourceError):
-        sh.piecewise_distance(sh.intrinsic_delaunay(mesh), across)
+        sh.piecewise_distance(across, sh.intrinsic_delaunay(mesh))
 
 
 @pytest.mark.parametrize(("step", "above"), [("integrate", 0.4), ("cut", 0.6)])
@@ -387,13 +387,13 @@ def test_progress_can_cancel(step, above):
 
     mesh, curve = CASES["open arc"]()
     with pytest.raises(Stop):
-        sh.piecewise_distance(mesh, curve, progress=progress)
+        sh.piecewise_distance(curve, mesh, progress=progress)
 
 
 def test_progress_grows():
     told = []
     mesh, curves = CASES["open arc"]()
-    sh.piecewise_distance(mesh, curves, progress=lambda fraction, step: told.append((fraction, step)))
+    sh.piecewise_distance(curves, mesh, progress=lambda fraction, step: told.append((fraction, step)))
     steps = ["prepare", "diffuse", "integrate", "cut", "finish"]
     assert {step for _, step in told} == {*steps, "done"}
     assert 0 <= min(told)[0] and max(told)[0] == 1 and told[-1] == (1.0, "done")
@@ -409,7 +409,7 @@ def test_curves_that_bound_take_few_rounds(build):
     mesh = build()
     heights = np.linalg.norm(mesh.vertices - mesh.vertices[7], axis=1) - 0.8
     curve = mesh.level_set(heights)
-    phi = sh.piecewise_distance(mesh, curve)
+    phi = sh.piecewise_distance(curve, mesh)
     assert phi.diagnostics.note(Jumps).rounds <= 200 and phi.diagnostics.note(Jumps).continuous
     plain = sh.SignedHeatSolver(mesh).distance(curve, sh.constraints.Free()).values
     difference = phi.values.mean(axis=1) - plain[mesh.faces].mean(axis=1)
@@ -420,7 +420,7 @@ def test_curves_that_bound_take_few_rounds(build):
 def test_a_cut_spread_over_many_edges_is_no_continuity(n_around):
     """Round the tube of a torus all cuts cost the same, on the way to the solution φ jumps a little everywhere."""
     mesh = torus(n_around=n_around, n_across=24)
-    phi = sh.piecewise_distance(mesh, mesh.path(range(24), closed=True))
+    phi = sh.piecewise_distance(mesh.path(range(24), closed=True), mesh)
     assert len(phi.cut) == 1 and phi.diagnostics.note(Jumps).gap < 0.01
 
 
@@ -437,8 +437,8 @@ def test_triangles_on_which_slopes_mean_nothing_are_told():
     )
     section = mesh.level_set(mesh.vertices @ [0.3, 0, 1], 0.45 * height)
     with pytest.warns(sh.errors.InexactWarning):
-        rough = sh.piecewise_distance(mesh, section, intrinsic=False, smooth=False)
-    fine = sh.piecewise_distance(mesh, section)
+        rough = sh.piecewise_distance(section, mesh, intrinsic=False, smooth=False)
+    fine = sh.piecewise_distance(section, mesh)
     errors = [phi.diagnostics.note(Jumps).integration_error for phi in (rough, fine)]
     assert errors[0] > 1 and errors[1] < 0.1
     assert fine.diagnostics.note(Jumps).continuous
@@ -447,7 +447,7 @@ def test_triangles_on_which_slopes_mean_nothing_are_told():
 def test_line_along_a_cylinder_is_distance_on_the_strip_cut_open():
     """φ is the way round, with one straight cut from rim to rim, at which it falls by all of the way round."""
     mesh = cylinder(64, 32)
-    phi = sh.piecewise_distance(mesh, mesh.path(range(32)))
+    phi = sh.piecewise_distance(mesh.path(range(32)), mesh)
     (cut,) = phi.cut
     around = 64 * 2 * np.sin(np.pi / 64)
     assert cut.length == pytest.approx(2.0)
@@ -468,7 +468,7 @@ def sheared(mesh: sh.TriangleMesh) -> sh.TriangleMesh:
 def test_bad_triangles_are_retriangulated():
     mesh = sheared(torus(n_around=48, n_across=16))
     loop = mesh.level_set(mesh.vertices[:, 0] + 0.1 * mesh.vertices[:, 2], 0.1)[0]  # one of the two
-    phi, rough = (sh.piecewise_distance(mesh, loop, intrinsic=i) for i in ("auto", False))
+    phi, rough = (sh.piecewise_distance(loop, mesh, intrinsic=i) for i in ("auto", False))
     assert isinstance(phi.domain, sh.IntrinsicTriangulation)
     assert not isinstance(rough.domain, sh.IntrinsicTriangulation)
     errors = [field.diagnostics.note(Jumps).integration_error for field in (phi, rough)]
@@ -482,7 +482,7 @@ def test_unoriented_curve_along_edges_of_bad_triangles():
     mesh = sheared(torus(n_around=48, n_across=16))
     ids = np.arange(16) + 160
     curve = mesh.path(ids, oriented=False)
-    phi = sh.piecewise_distance(mesh, curve)
+    phi = sh.piecewise_distance(curve, mesh)
     assert isinstance(phi.domain, sh.IntrinsicTriangulation)
     assert np.abs(phi(mesh.points_at(ids))).max() < 0.5 * mesh.edge_lengths.mean()
     assert phi(mesh.points_at((ids + 384) % 768)).min() > 1.0
@@ -492,7 +492,7 @@ def test_arithmetic_keeps_the_triangles_on_which_the_field_is_linear():
     """Points are given on the mesh, also for fields that are made of one on another triangulation of it."""
     strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     line = strip.polyline([[4, 0, 0], [4, 1, 0]])
-    phi = sh.piecewise_distance(strip, line, intrinsic=True)
+    phi = sh.piecewise_distance(line, strip, intrinsic=True)
     places = sh.SurfacePoints([0, 1], np.full((2, 3), 1 / 3))
     for changed in (-phi, 2 * phi - phi(places)[0], phi + 0):
         assert type(changed) is type(phi)

@@ -217,17 +217,17 @@ def test_what_does_not_fit_is_refused():
 @pytest.mark.parametrize("ending", ["svg", "csv"])
 def test_open_lines_far_away_stay_open_and_no_lines_are_no_file(tmp_path, ending):
     far = sh.Polyline([[1e9, 0], [1e9 + 0.5, 0], [1e9 + 0.5, 0.5], [1e9 + 0.25, 0.5]])
-    sh.io.write_polylines(tmp_path / f"far.{ending}", far)
+    sh.io.write_polylines(far, tmp_path / f"far.{ending}")
     [read] = sh.io.read_polylines(tmp_path / f"far.{ending}")
     assert not read.closed and np.array_equal(read.points, far.points)
     with refused(sh.errors.FileFormatError, file=f"none.{ending}"):
-        sh.io.write_polylines(tmp_path / f"none.{ending}", [])
+        sh.io.write_polylines([], tmp_path / f"none.{ending}")
 
 
 @pytest.mark.parametrize("ending", ["svg", "csv"])
 def test_lines_there_and_back_are_closed_in_every_format(tmp_path, ending):
     back = sh.Polyline([[0, 0], [1, 0]], closed=True)
-    sh.io.write_polylines(tmp_path / f"back.{ending}", back)
+    sh.io.write_polylines(back, tmp_path / f"back.{ending}")
     [read] = sh.io.read_polylines(tmp_path / f"back.{ending}")
     assert read.closed and read.points.tolist() == back.points.tolist()
 

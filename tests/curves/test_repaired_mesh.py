@@ -89,7 +89,7 @@ def test_strokes_are_repaired_on_broken_meshes(name, whole):
 @pytest.mark.parametrize("name", [name for name in BROKEN if "tents" not in name])  # lines branch where those stand
 def test_strokes_are_completed_on_broken_meshes(name):
     mesh = BROKEN[name]()
-    [line] = sh.close_curves(mesh, strokes(mesh))
+    [line] = sh.close_curves(strokes(mesh), mesh)
     assert line.closed
     np.testing.assert_allclose(mesh.positions(line)[:, 2], 0.2, atol=0.02)
 
@@ -152,10 +152,10 @@ def test_level_sets_pass_through_seams_on_both_sides_of_which_the_function_is_th
 
 def test_curves_are_closed_across_seams():
     mesh = with_seam()
-    [whole] = sh.close_curves(mesh, strokes(mesh))
+    [whole] = sh.close_curves(strokes(mesh), mesh)
     assert whole.closed
     np.testing.assert_allclose(mesh.positions(whole)[:, 2], 0.2, atol=0.05)
-    phi = sh.piecewise_distance(mesh, strokes(mesh, turned=()))
+    phi = sh.piecewise_distance(strokes(mesh, turned=()), mesh)
     assert len(phi.cut) == 0
 
 

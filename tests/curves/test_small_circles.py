@@ -65,7 +65,7 @@ def test_each_is_turned_and_closed_by_one_loop():
     centers = centers_on_sphere(8, 3 * radius)
     given, wrong = circles(mesh, centers, radius, 4, 0.3)
     assert (sh.curve_orientation(given, mesh).turned == wrong).all()
-    found = sh.close_curves(mesh, given)
+    found = sh.close_curves(given, mesh)
     assert len(found) == 8 and all(curve.closed for curve in found)
     for curve in found:
         at = np.einsum("nk,nkd->nd", curve.barycentric, mesh.vertices[mesh.faces[curve.faces]])

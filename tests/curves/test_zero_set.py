@@ -41,7 +41,7 @@ def area(mesh: sh.TriangleMesh, curve: sh.Curve) -> float:
 def test_a_closed_curve_along_the_rim_is_one_loop(corners, turned):
     mesh = grid()
     curve = drawn(mesh, corners[::-1] if turned else corners, closed=True)
-    (whole,) = sh.close_curves(mesh, curve)
+    (whole,) = sh.close_curves(curve, mesh)
     assert whole.closed
     assert area(mesh, whole) == pytest.approx(area(mesh, curve), rel=0.02)
 
@@ -49,7 +49,7 @@ def test_a_closed_curve_along_the_rim_is_one_loop(corners, turned):
 def test_pieces_along_the_rim_are_closed_by_one_loop():
     mesh = grid()
     pieces = [[[8, 0], [20, 0], [20, 5]], [[18, 8], [10, 8]], [[8, 6], [8, 0]]]
-    (whole,) = sh.close_curves(mesh, [drawn(mesh, piece) for piece in pieces])
+    (whole,) = sh.close_curves([drawn(mesh, piece) for piece in pieces], mesh)
     assert whole.closed
     assert area(mesh, whole) == pytest.approx(96, rel=0.1)
 
@@ -57,7 +57,7 @@ def test_pieces_along_the_rim_are_closed_by_one_loop():
 def test_the_whole_rim_is_a_loop():
     mesh = disk(8)
     (rim,) = mesh.boundary_curves()
-    (whole,) = sh.close_curves(mesh, rim)
+    (whole,) = sh.close_curves(rim, mesh)
     assert whole.closed
     assert area(mesh, whole) == pytest.approx(area(mesh, rim), rel=1e-3)
 
@@ -65,7 +65,7 @@ def test_the_whole_rim_is_a_loop():
 def test_curves_that_end_on_the_rim_still_do():
     mesh = grid()
     for start in (0.0, 0.4):
-        (whole,) = sh.close_curves(mesh, drawn(mesh, [[20, start], [20, 8.3], [8, 8.3], [8, start]]))
+        (whole,) = sh.close_curves(drawn(mesh, [[20, start], [20, 8.3], [8, 8.3], [8, start]]), mesh)
         assert not whole.closed
         at = np.einsum("nk,nkd->nd", whole.barycentric, mesh.vertices[mesh.faces[whole.faces]])
         assert np.abs(at[[0, -1], 1]).max() < 1e-6

@@ -171,7 +171,7 @@ def _save_voxels(random: Random, path: Path) -> None:
 
 def _save_lines(random: Random, path: Path) -> None:
     points = random.normal(size=(int(random.integers(2, 9)), 2)) * one_of(random, SIZES)
-    sh.io.write_polylines(path, [sh.Polyline(points, closed=chance(random, 0.5))])
+    sh.io.write_polylines([sh.Polyline(points, closed=chance(random, 0.5))], path)
 
 
 def _save_quads(random: Random, path: Path) -> None:

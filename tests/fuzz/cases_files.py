@@ -306,14 +306,14 @@ def lines() -> list[Files]:
     drawing = """<svg xmlns="http://www.w3.org/2000/svg"><g transform="translate(3 4) rotate(30)"><path
     d="M0 0 C 1 2 3 4 5 6 A 3 4 5 0 1 7 8 Q 1 1 2 2 Z m 3 3 h 4 v -5"/><rect x="1" y="2" width="3" height="4"/></g>
     <circle cx="1" cy="2" r="3"/><ellipse cx="0" cy="0" rx="2" ry="1"/><polyline points="0,0 1,1 2,0"/></svg>"""
-    files = [written(lambda path: sh.io.write_polylines(path, [square, square]), f"lines.{e}") for e in ("svg", "csv")]
+    files = [written(lambda path: sh.io.write_polylines([square, square], path), f"lines.{e}") for e in ("svg", "csv")]
     return [*files, {"lines.svg": drawing.encode()}]
 
 
 @cache
 def curves() -> list[Files]:
     """Curves and points on a surface."""
-    files = [written(lambda path: sh.io.write_curves(path, CURVES, BALL), f"curves.{e}") for e in ("json", "obj")]
+    files = [written(lambda path: sh.io.write_curves(CURVES, path, BALL), f"curves.{e}") for e in ("json", "obj")]
     table = "x,y,z\n" + "".join(",".join(map(str, p)) + "\n" for p in BALL.vertices[[0, 1, 2]].tolist())
     return [
         *files,

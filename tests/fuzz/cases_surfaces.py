@@ -211,7 +211,7 @@ def check_use(given: Subject) -> str:
         judge(slopes, warned, np.inf, "gradient")
         return "evaluated"
     if kind == 4:
-        found, _ = announced(lambda: sh.close_curves(phi.domain, sources))
+        found, _ = announced(lambda: sh.close_curves(sources, phi.domain))
         for curve in found:
             judge(curve.barycentric, False, 1.0, "closed curve")
         return "closed"
@@ -231,7 +231,7 @@ def check_piecewise(given: Subject) -> str:
     domain = surface(random)
     sources = [source(random, domain) for _ in range(random.integers(1, 3))]
     smooth = chance(random, 0.7)
-    phi, warned = announced(lambda: sh.piecewise_distance(domain, sources, smooth=smooth))
+    phi, warned = announced(lambda: sh.piecewise_distance(sources, domain, smooth=smooth))
     judge(phi.values, warned, length_of_edges(embedded(domain)))
     for cut in phi.cut:
         judge(cut.points, False, np.inf, "cut")

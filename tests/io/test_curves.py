@@ -26,7 +26,7 @@ def some_curves(mesh):
 def test_curves_read_back_the_same(tmp_path):
     mesh = sphere(2)
     curves = some_curves(mesh)
-    sh.io.write_curves(tmp_path / "curves.json", curves, mesh)
+    sh.io.write_curves(curves, tmp_path / "curves.json", mesh)
     back = sh.io.read_curves(tmp_path / "curves.json", mesh)
     assert len(back) == len(curves)
     for old, new in zip(curves, back, strict=True):
@@ -39,8 +39,8 @@ def test_curves_read_back_the_same(tmp_path):
 def test_strict_reading_refuses_points_that_share_no_face(tmp_path):
     mesh = square(5)
     walk = mesh.path([6, 7, 12, 11], closed=True)
-    sh.io.write_curves(tmp_path / "walk.json", walk, mesh)
-    sh.io.write_curves(tmp_path / "jump.json", [walk, mesh.path([0, 1, 24])], mesh)
+    sh.io.write_curves(walk, tmp_path / "walk.json", mesh)
+    sh.io.write_curves([walk, mesh.path([0, 1, 24])], tmp_path / "jump.json", mesh)
     assert len(sh.io.read_curves(tmp_path / "walk.json", mesh, strict=True)) == 1
     assert len(sh.io.read_curves(tmp_path / "jump.json", mesh)) == 2
     with refused(sh.errors.SourceError, "curve 1"):
@@ -60,7 +60,7 @@ def test_curves_across_a_seam_have_no_gap_there(tmp_path):
 def test_obj_lines_read_back_as_the_same_lines(tmp_path):
     mesh = sphere(2)
     curves = [c for c in some_curves(mesh) if not isinstance(c, sh.Curve) or c.oriented][1:]
-    sh.io.write_curves(tmp_path / "curves.obj", curves, mesh)
+    sh.io.write_curves(curves, tmp_path / "curves.obj", mesh)
     back = sh.io.read_curves(tmp_path / "curves.obj", mesh)
     for old, new in zip(curves, back, strict=True):
         assert np.abs(positions(mesh, old) - positions(mesh, new)).max() < 1e-12
@@ -118,5 +118,5 @@ def test_unknown_formats_are_refused_and_nothing_is_overwritten(tmp_path):
     path = tmp_path / "curves.json"
     path.write_text("kept")
     with refused(sh.errors.SourceError, "item 0"):
-        sh.io.write_curves(path, ["no curve"], mesh)
+        sh.io.write_curves(["no curve"], path, mesh)
     assert path.read_text() == "kept"

@@ -67,7 +67,7 @@ def test_fields_on_grids(folder, ending, seed, shape, scale):
 def test_curves(folder, data, mesh, closed):
     at = data.draw(surface_points(mesh, 3, 8))
     curve = sh.Curve(at.faces, at.barycentric, closed=closed)
-    sh.io.write_curves(folder / "curve.json", curve, mesh)
+    sh.io.write_curves(curve, folder / "curve.json", mesh)
     [back] = sh.io.read_curves(folder / "curve.json", mesh)
     assert back.closed == closed
     np.testing.assert_allclose(in_space(mesh, back), in_space(mesh, curve), atol=1e-12 * np.abs(mesh.vertices).max())

@@ -68,7 +68,7 @@ def test_points_of_elements_lie_where_they_should():
     one = sh.signed_distance(elements, BALL, as_oriented=True)
     for same in ([elements], curve_of_elements(BALL, elements)):
         np.testing.assert_array_equal(one.values, sh.signed_distance(same, BALL, as_oriented=True).values)
-    for measure in (sh.SignedHeatSolver(BALL).distance, partial(sh.piecewise_distance, BALL)):
+    for measure in (sh.SignedHeatSolver(BALL).distance, partial(sh.piecewise_distance, domain=BALL)):
         np.testing.assert_array_equal(measure(elements).values, measure(curve_of_elements(BALL, elements)).values)
     for missing in ((10**6, []), (10**6, [0.5]), (10**6, [0.2, 0.3]), (-1, [])):
         kind = ("vertex", "edge", "face")[len(missing[1])]
@@ -88,7 +88,7 @@ def test_elements_are_curves_whatever_is_done_with_them():
         kept, whole = sh.intrinsic_delaunay(BALL, keep=given), sh.intrinsic_delaunay(BALL, keep=same)
         np.testing.assert_array_equal(kept.triangles.corner_vertices, whole.triangles.corner_vertices)
         for as_oriented in (False, True):
-            closed, theirs = (sh.close_curves(BALL, each, as_oriented=as_oriented) for each in (given, same))
+            closed, theirs = (sh.close_curves(each, BALL, as_oriented=as_oriented) for each in (given, same))
             np.testing.assert_array_equal(closed[0].barycentric, theirs[0].barycentric)
     for given in (ring, [ring], [[ring, same.reversed()]]):  # those of a group one by one
         found = sh.curve_orientation(given, BALL)
@@ -100,21 +100,21 @@ def test_a_missing_face_is_one_error_wherever_it_is_met(faces, tmp_path):
     """Curves are numbered as they were given, whatever is left out."""
     wrong, click = sh.Curve(faces, np.eye(3)[:2]), sh.Curve([0, 0], [[1, 0, 0], [1, 0, 0]])
     phi, better = sh.signed_distance(RING, BALL), sh.intrinsic_delaunay(BALL)
-    cut, finer = sh.piecewise_distance(BALL, RING), sh.piecewise_distance(better, RING)
+    cut, finer = sh.piecewise_distance(RING, BALL), sh.piecewise_distance(RING, better)
     of_sources = [
         lambda given: sh.signed_distance(given, BALL),
         lambda given: sh.signed_distance(given, better),
         sh.SignedHeatSolver(BALL).distance,
         lambda given: sh.SignedHeatSolver(BALL).distance_many([given]),
-        partial(sh.piecewise_distance, BALL),
-        partial(sh.close_curves, BALL),
+        partial(sh.piecewise_distance, domain=BALL),
+        partial(sh.close_curves, domain=BALL),
         partial(sh.intrinsic_delaunay, BALL),
         partial(sh.sharpen, phi),
     ]
     of_points = [
         BALL.positions, phi, phi.gradient, cut, cut.gradient, finer, finer.gradient, better.transfer,
-        lambda given: sh.io.write_curves(tmp_path / "a.json", given, BALL),
-        lambda given: sh.io.write_curves(tmp_path / "a.obj", given, BALL),
+        lambda given: sh.io.write_curves(given, tmp_path / "a.json", BALL),
+        lambda given: sh.io.write_curves(given, tmp_path / "a.obj", BALL),
         lambda given: better.in_space(given.faces, given.barycentric),
     ]  # fmt: skip
     for measure in of_sources:
@@ -152,7 +152,7 @@ def test_positions_of_curves():
         lambda mesh, curves: sh.SignedHeatSolver(mesh).distance_many([curves])[0],
         lambda mesh, curves: sh.SignedHeatSolver(sh.intrinsic_delaunay(mesh)).distance(curves),
         lambda mesh, curves: sh.sharpen(sh.SignedHeatSolver(mesh).distance(curves), curves),
-        lambda mesh, curves: sh.piecewise_distance(mesh, curves),
+        lambda mesh, curves: sh.piecewise_distance(curves, mesh),
     ],
 )
 def test_a_click_among_strokes_is_left_out_with_a_note(measure, click):

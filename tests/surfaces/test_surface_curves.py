@@ -163,7 +163,7 @@ def test_rounding_changes_no_number_of_points(intrinsic):
     completed = set()
     for _ in range(5):
         moved = sh.TriangleMesh(flat.vertices + 1e-16 * random.normal(size=flat.vertices.shape), flat.faces)
-        completed.add(sh.close_curves(moved, [moved.polyline(stroke) for stroke in strokes])[0].n_points)
+        completed.add(sh.close_curves([moved.polyline(stroke) for stroke in strokes], moved)[0].n_points)
     assert len(completed) == 1
 
 

@@ -119,7 +119,7 @@ def test_broken_circles_are_closed():
     turn = np.linspace(0, 2 * np.pi, 120, endpoint=False)
     circle = 0.6 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
     broken = [mesh.polyline(circle[a:b]) for a, b in ((0, 20), (28, 55), (66, 80), (85, 113))]
-    whole = sh.close_curves(mesh, broken)
+    whole = sh.close_curves(broken, mesh)
     longest = max(whole, key=lambda curve: curve.n_points)
     assert longest.closed
     radius = np.linalg.norm(positions(mesh, longest), axis=1)
@@ -131,7 +131,7 @@ def test_broken_rings_on_a_cylinder_are_closed():
     ring = band(64, 12, twisted=False)
     middle = [13 * i + 6 for i in range(64)]
     broken = [ring.path(middle[:20]), ring.path(middle[26:50])]
-    (whole,) = sh.close_curves(ring, broken)
+    (whole,) = sh.close_curves(broken, ring)
     assert whole.closed and np.abs(positions(ring, whole)[:, 2]).max() < 0.02
 
 

@@ -75,10 +75,10 @@ better = sh.intrinsic_delaunay(mesh, keep=curve, refine=True)
 on_better = sh.SignedHeatSolver(better).distance(curve)
 assert_type(on_better, sh.VertexField[sh.IntrinsicTriangulation])
 assert_type(on_better.restrict(), sh.VertexField[sh.TriangleMesh])
-pieces = sh.piecewise_distance(mesh, [curve])
+pieces = sh.piecewise_distance([curve], mesh)
 assert_type(pieces, sh.PiecewiseField)
 assert_type(pieces.gradient(mesh.points_at([0])), NDArray[np.float64])
-assert_type(sh.close_curves(mesh, [curve, curve]), list[sh.Curve])
+assert_type(sh.close_curves([curve, curve], mesh), list[sh.Curve])
 assert_type(sh.io.read_curves("curves.json", mesh), list[sh.Curve | sh.SurfacePoints])
 
 # --- unions where it truly is one

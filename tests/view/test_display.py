@@ -29,7 +29,7 @@ def height(points):
 
 
 def piecewise():
-    return sh.piecewise_distance(BALL, [BALL.polyline([[1.0, 0, 0.2], [0, 1.0, 0.1]])])
+    return sh.piecewise_distance([BALL.polyline([[1.0, 0, 0.2], [0, 1.0, 0.1]])], BALL)
 
 
 THINGS = {

@@ -84,8 +84,8 @@ def test_sources_are_drawn_where_they_are_whatever_triangles_the_field_has():
     loop = mesh.path(range(16), closed=True)
     fields = [
         sh.SignedHeatSolver(mesh).distance(loop),
-        sh.piecewise_distance(mesh, loop),
-        sh.piecewise_distance(mesh, loop, intrinsic=True),
+        sh.piecewise_distance(loop, mesh),
+        sh.piecewise_distance(loop, mesh, intrinsic=True),
     ]
     assert isinstance(fields[2].domain, sh.IntrinsicTriangulation)
     drawn = []
@@ -103,7 +103,7 @@ def test_sources_are_drawn_where_they_are_whatever_triangles_the_field_has():
 @pytest.mark.parametrize("thing", [None, sh.Grid((0, 0), 1.0, (2, 2)), samples.sphere(1).points_at(0)])
 def test_rows_have_no_empty_panels(tmp_path, thing):
     with refused(sh.errors.UnsupportedTypeError, "odd"):
-        view.save_row(tmp_path / "row.png", ("ball", samples.sphere(1)), ("odd", thing))
+        view.save_row([("ball", samples.sphere(1)), ("odd", thing)], tmp_path / "row.png")
 
 
 def test_infinite_values_are_refused(tmp_path):

@@ -125,7 +125,7 @@ def surface(arguments: Namespace) -> Summary:
         summary["contours"] = f"{arguments.output}.contours.obj"
         levels = numpy.linspace(low, high, arguments.contours + 2)[1:-1].tolist()
         isolines = [curve for level in levels for curve in field.contour(level)]
-        sh.io.write_curves(summary["contours"], isolines, domain)
+        sh.io.write_curves(isolines, summary["contours"], domain)
     if arguments.preview:
         up = "xyz".index(arguments.up)
         sh.view.save_surface(field, arguments.preview, sources, arguments.contours or 20, up)
@@ -168,7 +168,7 @@ def close(arguments: Namespace) -> Summary:
                 arguments.as_oriented or arguments.plain,
                 arguments.every_piece,
             )
-    sh.io.write_curves(arguments.output, completed, domain)
+    sh.io.write_curves(completed, arguments.output, domain)
     if arguments.preview:
         sh.view.save_surface(field, arguments.preview, completed, up="xyz".index(arguments.up))
     closed = sum(curve.closed for curve in completed)

@@ -50,8 +50,8 @@ def curves() -> None:
     ball = samples.sphere(2)
     curve = _curve(ball)
     sh.signed_distance(curve, ball)
-    sh.close_curves(ball, curve)
-    sh.piecewise_distance(ball, curve)
+    sh.close_curves(curve, ball)
+    sh.piecewise_distance(curve, ball)
 
 
 def surfaces() -> None:

@@ -347,7 +347,7 @@ def save_level(what: Any, path: str, image: sh.io.LabelImage | None = None, fiel
     Where the field has a confidence, and the format has room for it, that is written at each vertex.
     """
     if isinstance(what, list):
-        return sh.io.write_polylines(path, what)
+        return sh.io.write_polylines(what, path)
     placed = what if image is None else image.to_world(what)
     if field is not None and field.confidence is not None and extension(path) in VALUE_FORMATS:
         save_with_values(placed, path, CONFIDENCE, field.confidence_at(what.vertices))

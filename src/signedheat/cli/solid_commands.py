@@ -382,7 +382,7 @@ def contour(arguments: Namespace) -> Summary:
     with shapes.prefix_errors(arguments.field):
         surface = field.contour(arguments.level)
     if on_surface:
-        sh.io.write_curves(path, surface, field.domain)
+        sh.io.write_curves(surface, path, field.domain)
         numbers = {"curves": len(surface)}
     else:
         shapes.save_level(surface, path, image, field if isinstance(field, sh.GridField) else None)

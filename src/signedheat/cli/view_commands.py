@@ -128,7 +128,7 @@ def view(arguments: Namespace) -> Summary:
         elif isinstance(thing, sh.GridField | sh.TetField):
             sh.view.save_slices(thing, output)
         elif isinstance(thing, list):
-            sh.view.save_row(output, (Path(arguments.file).name, thing))
+            sh.view.save_row([(Path(arguments.file).name, thing)], output)
         else:
             sh.view.save_scene(thing, output, up)
     return {"input": arguments.file, "output": output}, output
@@ -332,10 +332,12 @@ def demo(arguments: Namespace) -> Summary:
     ]
     if "picture.png" in files:
         sh.view.save_row(
+            [
+                ("in: holes, noise, flipped and\nduplicate faces", shape),
+                ("its signed distance", field, {"shape": shape, "levels": [DEMO_OFFSET], "across": (1,)}),
+                (f"out: the closed surface at +{DEMO_OFFSET:g}", surface),
+            ],
             files["picture.png"],
-            ("in: holes, noise, flipped and\nduplicate faces", shape),
-            ("its signed distance", field, {"shape": shape, "levels": [DEMO_OFFSET], "across": (1,)}),
-            (f"out: the closed surface at +{DEMO_OFFSET:g}", surface),
         )
         lines.append(f"{files['picture.png']}: a picture of them")
     names = [str(path) for path in files.values()]

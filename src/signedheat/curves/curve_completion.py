@@ -37,8 +37,8 @@ the wrong sign inside them."""
 
 @within_memory
 def close_curves(
-    domain: SurfaceDomain | ForeignShape,
     curves: CurvesAndPoints | ElementList | Sequence[ElementList],
+    domain: SurfaceDomain | ForeignShape,
     *,
     diffusion: float = 1.0,
     constraint: Constraint | None = None,
@@ -53,11 +53,11 @@ def close_curves(
 
     Parameters
     ----------
-    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
-        The surface.
     curves : Curve or a sequence of them
         Oriented curves, open or closed, noisy, overlapping, crossing; or lists of (element, coordinates), as for
         `signed_distance`. Curves without length complete nothing, and are left out if there are others.
+    domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
+        The surface.
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
         the length of the pieces, unless the triangles made along them are larger.
@@ -90,7 +90,7 @@ def close_curves(
     >>> faces = np.concatenate([corner[:, None] + [0, 5, 6], corner[:, None] + [0, 6, 1]])
     >>> mesh = sh.TriangleMesh(np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1), faces)
     >>> broken = [mesh.polyline([[0, 2.5, 0], [2, 2.5, 0]]), mesh.polyline([[4, 2.5, 0], [7, 2.5, 0]])]
-    >>> whole = sh.close_curves(mesh, broken)
+    >>> whole = sh.close_curves(broken, mesh)
     >>> whole
     [Curve(21 points, open, oriented)]
     """

@@ -48,8 +48,8 @@ BYTES_WITH_JUMPS = {"pardiso": (2600, 0), "superlu": (525, 182)}
 
 @within_memory
 def piecewise_distance(
-    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation | ForeignShape,
     sources: CurvesAndPoints,
+    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation | ForeignShape,
     *,
     diffusion: float = 1.0,
     intrinsic: bool | Literal["auto"] = "auto",
@@ -69,11 +69,11 @@ def piecewise_distance(
 
     Parameters
     ----------
-    domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
-        The surface.
     sources : Curve, SurfacePoints, or a sequence of them
         If unoriented curves do not run along edges, the surface is retriangulated so that they do: the domain of the
         field is then ``intrinsic_delaunay(surface, keep=sources)``, which can also be passed as the domain.
+    domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
+        The surface.
     diffusion : float
         τ in ``t = τ h²``.
     intrinsic : "auto", True or False
@@ -112,7 +112,7 @@ def piecewise_distance(
     >>> from signedheat.diagnostics import Jumps
     >>> from signedheat.samples import torus
     >>> mesh = torus(n_around=48, n_across=24)
-    >>> phi = piecewise_distance(mesh, mesh.path(range(24), closed=True))  # round the tube: bounds nothing
+    >>> phi = piecewise_distance(mesh.path(range(24), closed=True), mesh)  # round the tube: bounds nothing
     >>> len(phi.cut), phi.diagnostics.note(Jumps).gap < 0.002
     (1, True)
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π

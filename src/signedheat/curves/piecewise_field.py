@@ -126,7 +126,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         --------
         >>> import signedheat as sh
         >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi = sh.piecewise_distance(ball.level_set(ball.vertices[:, 2]), ball)
         >>> phi.gradient(ball.points_at([0, 1])).shape
         (2, 3)
         """
@@ -193,7 +193,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         --------
         >>> import signedheat as sh
         >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi = sh.piecewise_distance(ball.level_set(ball.vertices[:, 2]), ball)
         >>> phi.split().domain.n_faces == ball.n_faces
         True
         """
@@ -227,7 +227,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         --------
         >>> import signedheat as sh
         >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi = sh.piecewise_distance(ball.level_set(ball.vertices[:, 2]), ball)
         >>> len(phi.contour(0.2))
         1
         """
@@ -255,7 +255,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         >>> import tempfile
         >>> import signedheat as sh
         >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.piecewise_distance(ball, ball.level_set(ball.vertices[:, 2]))
+        >>> phi = sh.piecewise_distance(ball.level_set(ball.vertices[:, 2]), ball)
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     phi.save(f"{folder}/phi.ply")
         ...     sh.load_field(f"{folder}/phi.ply").domain.n_faces == ball.n_faces

@@ -74,7 +74,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     >>> import tempfile, signedheat as sh
     >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_curves(f"{folder}/curves.json", [mesh.path([0, 1, 2])], mesh)
+    ...     write_curves([mesh.path([0, 1, 2])], f"{folder}/curves.json", mesh)
     ...     read_curves(f"{folder}/curves.json", mesh)
     [Curve(3 points, open, oriented)]
     """
@@ -108,7 +108,7 @@ def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
 
 
 def write_curves(
-    path: PathLike, curves: CurveOrPoints | Sequence[CurveOrPoints], domain: EmbeddedSurface | ForeignShape
+    curves: CurveOrPoints | Sequence[CurveOrPoints], path: PathLike, domain: EmbeddedSurface | ForeignShape
 ) -> None:
     """Write curves and points on a surface, in the format given by the extension.
 
@@ -116,10 +116,10 @@ def write_curves(
 
     Parameters
     ----------
-    path : str or path
-        The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
     curves : Curve, SurfacePoints or a sequence of them
         The curves and points.
+    path : str or path
+        The file. It is written under a temporary name and renamed, so that an existing file survives a failure.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface they lie on.
 
@@ -133,7 +133,7 @@ def write_curves(
     >>> import tempfile, signedheat as sh
     >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_curves(f"{folder}/side.json", mesh.path([0, 1]), mesh)
+    ...     write_curves(mesh.path([0, 1]), f"{folder}/side.json", mesh)
     ...     read_curves(f"{folder}/side.json", mesh)
     [Curve(2 points, open, oriented)]
     """

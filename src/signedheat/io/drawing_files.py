@@ -335,7 +335,7 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     >>> import tempfile
     >>> square = Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_polylines(f"{folder}/square.svg", square)
+    ...     write_polylines(square, f"{folder}/square.svg")
     ...     read_polylines(f"{folder}/square.svg")
     [Polyline(4 points, closed)]
     """
@@ -353,16 +353,16 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     return lines
 
 
-def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> None:
+def write_polylines(lines: Polyline | Sequence[Polyline], path: PathLike) -> None:
     """Write polylines in the plane, in the format given by the extension.
 
     Parameters
     ----------
+    lines : Polyline or sequence of Polyline
+        The polylines.
     path : str or path
         ``.svg`` or ``.csv``, which `read_polylines` reads back exactly. It is written under a temporary name and
         renamed, so that an existing file survives a failure.
-    lines : Polyline or sequence of Polyline
-        The polylines.
 
     Raises
     ------
@@ -373,7 +373,7 @@ def write_polylines(path: PathLike, lines: Polyline | Sequence[Polyline]) -> Non
     --------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_polylines(f"{folder}/square.csv", Polyline([[0, 0], [1, 0], [1, 1], [0, 1]], closed=True))
+    ...     write_polylines(Polyline([[0, 0], [1, 0], [1, 1], [0, 1]], closed=True), f"{folder}/square.csv")
     ...     read_polylines(f"{folder}/square.csv")
     [Polyline(4 points, closed)]
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+from collections.abc import Iterable
 from functools import singledispatch
 from typing import Any
 
@@ -33,17 +34,17 @@ from .surface_pictures import draw_shape, draw_surface
 pillow: Any = lazy_module("PIL.Image", "pictures")
 
 
-def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
+def save_row(panels: Iterable[tuple[Any, ...]], path: PathLike) -> None:
     """Write a picture of several shapes and fields, side by side, each with its title.
 
     Parameters
     ----------
-    path : str or path
-        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
-    panels : tuples of (title, thing) or (title, thing, options)
+    panels : iterable of (title, thing) or (title, thing, options)
         A shape or a field, and a dictionary of options for it: ``view`` (elevation and azimuth) of shapes; ``shape``,
         ``levels`` and ``across`` of fields on grids, as in `draw_slices`; ``sources`` and ``view`` of fields on
         surfaces, as in `draw_surface`.
+    path : str or path
+        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
 
     Raises
     ------
@@ -52,9 +53,10 @@ def save_row(path: PathLike, *panels: tuple[Any, ...]) -> None:
     UnsupportedTypeError
         If something is neither a shape nor a field.
     """
-    with picture(path, 4.3 * len(panels), 4.3, dpi=110) as figure:  # in inches
-        for k, (title, thing, *options) in enumerate(panels):
-            axes = figure.add_subplot(1, len(panels), k + 1)
+    listed = list(panels)
+    with picture(path, 4.3 * len(listed), 4.3, dpi=110) as figure:  # in inches
+        for k, (title, thing, *options) in enumerate(listed):
+            axes = figure.add_subplot(1, len(listed), k + 1)
             if not draw(thing, axes, **(options[0] if options else {})):
                 kind = type(thing).__name__
                 raise UnsupportedTypeError(f"a {kind} cannot be drawn", remedy="pass a shape or a field", element=title)
