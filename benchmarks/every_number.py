@@ -169,7 +169,7 @@ def on_voxels() -> Floats:
 
 def checks() -> Floats:
     """Thickness, deviation of noise, and distances of samples."""
-    thin, noisy = sh.thickness(TWO_BOXES, resolution=24), samples.with_noise(BALL, 0.02, 0)
+    thin, noisy = sh.wall_thickness(TWO_BOXES, resolution=24), samples.with_noise(BALL, 0.02, 0)
     found = sh.deviation(noisy, BALL), sh.complete(BALL).sample(1000)
     return np.concatenate([*(np.sort(np.asarray(each.distances)) for each in found), np.sort(thin.values)[::20]])
 

@@ -155,8 +155,8 @@ def band(closed: bool, size: int) -> tuple[Callable[[], object], float]:
 def sampled(size: int) -> tuple[Callable[[], object], float]:
     """Samples of a ball with holes."""
     field = sh.signed_distance(samples.without_patches(samples.sphere(5), 4, 0.1), resolution=96)
-    sh.sample(field, 10)
-    return lambda: sh.sample(field, size), float(BYTES_PER_SAMPLE * size)
+    sh.sample_distances(field, 10)
+    return lambda: sh.sample_distances(field, size), float(BYTES_PER_SAMPLE * size)
 
 
 CASES = {

@@ -169,7 +169,7 @@ def start(subdivisions: int) -> None:
 def wait(path: str, count: int) -> None:
     """Load a solid, and ask it."""
     begin = time.perf_counter()
-    solid = sh.io.load(path)
+    solid = sh.read(path)
     loaded = time.perf_counter() - begin
     solid.distance([[0.0, 0.0, 0.0]])
     answered = time.perf_counter() - begin

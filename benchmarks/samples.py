@@ -66,14 +66,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("shapes", nargs="+", type=Path)
     options = parser.parse_args()
-    sh.sample(sh.signed_distance(samples.sphere(2), resolution=32), 1000)  # compiles
+    sh.sample_distances(sh.signed_distance(samples.sphere(2), resolution=32), 1000)  # compiles
     print("| shape | faces | with | CPU s | largest difference | signs that differ |")
     print("|---|---|---|---|---|---|")
     for path in options.shapes:
         shape = sh.read(path)
         vertices, faces = np.array(shape.vertices), np.array(shape.triangulation.faces, dtype=np.int64)
         field, before = clock(sh.signed_distance, shape)
-        taken, seconds = clock(sh.sample, field, COUNT)
+        taken, seconds = clock(sh.sample_distances, field, COUNT)
         chosen = np.random.default_rng(0).choice(COUNT, CHECKED, replace=False)
         truth = exact(vertices, faces, taken.points[chosen])
         size = float(np.ptp(vertices, axis=0).max())

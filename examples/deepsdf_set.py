@@ -11,7 +11,7 @@ import signedheat as sh
 from signedheat import samples, view
 
 ball = samples.sphere(5)
-found = sh.sample(sh.signed_distance(ball, resolution=48), 4000)
+found = sh.sample_distances(sh.signed_distance(ball, resolution=48), 4000)
 found.save("ball.npz", "deepsdf")
 
 grid = sh.Grid((-1.2, -1.2), 0.02, (121, 121))

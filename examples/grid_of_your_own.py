@@ -15,7 +15,7 @@ grid = sh.Grid(origin=(-1.5, -1.5, -1.6), spacing=(0.06, 0.06, 0.1), shape=(51, 
 sdf = sh.signed_distance(sphere, grid)
 sdf.save("distance.nrrd")
 
-again = sh.load_field("distance.nrrd")
+again = sh.read_field("distance.nrrd")
 view.save_slices(again, "grid_of_your_own.png", sphere)
 
 # %%

@@ -17,7 +17,7 @@ wave = np.stack([np.cos(angle), np.sin(angle), height], axis=1)
 pieces = [mesh.polyline(wave[a : a + 16]) for a in range(0, 180, 20)]  # four of 20 steps are missing
 drawn = [piece.reversed() if k % 3 == 0 else piece for k, piece in enumerate(pieces)]
 
-found = sh.curve_orientation(drawn, mesh)
+found = sh.orientation(drawn, mesh)
 assert found.turned.tolist() in ([k % 3 == 0 for k in range(9)], [k % 3 != 0 for k in range(9)])
 given = sh.SignedHeatSolver(mesh).distance(drawn)
 agreeing = sh.signed_distance(sh.orient(drawn, mesh), mesh, as_oriented=True)

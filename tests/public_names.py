@@ -6,7 +6,7 @@ import inspect
 
 import signedheat as sh
 
-READERS = [name for name in sh.io.__all__ if name.startswith(("load", "read_", "write_", "Label"))]
+READERS = [name for name in sh.io.__all__ if name.startswith(("read_", "write_", "Label"))]
 MODULES = {
     "batches": None,
     "constraints": None,

@@ -190,7 +190,7 @@ def test_numbers_are_not_missing_or_text():
     ("call", "name"),
     [
         (lambda: sh.complete(BALL, lids="round"), "lids"),
-        (lambda: sh.sample(BALL, 10).save("samples.npz", layout="columns"), "layout"),
+        (lambda: sh.sample_distances(BALL, 10).save("samples.npz", layout="columns"), "layout"),
         (lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), PLANE, fill="odd"), "fill"),
     ],
 )

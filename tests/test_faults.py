@@ -108,7 +108,7 @@ def stopped(folder, number, delay):
 
 def whole(folder):
     """Outputs are whole: the old ones or the new ones."""
-    phi = sh.load_field(folder / "phi.npz")
+    phi = sh.read_field(folder / "phi.npz")
     assert phi.grid.shape in ((12, 12, 12), (40, 40, 40))
 
 
@@ -276,7 +276,7 @@ def test_memory_that_is_not_free(tmp_path, monkeypatch):
 def test_threads_end(tmp_path):
     before = {thread.name for thread in threading.enumerate()}
     ON_TETS.save(tmp_path / "values.vtk")
-    sh.load_field(tmp_path / "values.vtk")
+    sh.read_field(tmp_path / "values.vtk")
     deadline = time.monotonic() + 10
     while {thread.name for thread in threading.enumerate()} - before and time.monotonic() < deadline:
         time.sleep(0.01)

@@ -130,7 +130,22 @@ def signed_distance(
 def signed_distance(
     source: Sources | ElementList | Sequence[ElementList],
     domain: Domain | ForeignShape | None = None,
-    **options: object,
+    *,
+    resolution: int | None = None,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    band: float | None = None,
+    completion: Completing = "lids",
+    lids: Lids = "bent",
+    nested: Nesting = "given",
+    fill: FillRule = "nonzero",
+    constraint: Constraint | None = None,
+    diffusion: Diffusion | None = None,
+    intrinsic: bool | Literal["auto"] = "auto",
+    as_oriented: bool = False,
+    keep_overlaps: bool = False,
+    every_piece: bool = False,
+    progress: Progress | None = None,
 ) -> Field:
     """Compute the signed distance to a broken shape, which is exact up to the completion of missing parts.
 
@@ -161,8 +176,8 @@ def signed_distance(
         In space: see `complete`.
     constraint : Free, ZeroSet or Soft, optional
         Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
-    diffusion : float
-        τ in ``t = τ h²``, if the signed heat method is used; larger values close gaps along rounder lines.
+    diffusion : float, optional
+        τ in ``t = τ h²``, 1 by default, if the signed heat method is used; larger values close gaps more roundly.
     fill : {"nonzero", "evenodd"}
         In the plane: the filling rule of closed outlines, as in SVG.
     as_oriented : bool
@@ -219,6 +234,8 @@ def signed_distance(
     >>> sh.signed_distance(square, resolution=33)([[0.5, 0.75]]).round(2).tolist()
     [-0.25]
     """
+    given = locals()
+    options = {name: given[name] for name, default in DEFAULTS.items() if given[name] is not default}
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
     parameters = inspect.signature(measure).parameters.values()
@@ -232,6 +249,14 @@ def signed_distance(
                 f"{option} is not an option here", remedy=f"the options are {', '.join(accepted)}", element=option
             )
     return measure(source, domain, **options)
+
+
+DEFAULTS = {
+    parameter.name: parameter.default
+    for parameter in inspect.signature(signed_distance).parameters.values()
+    if parameter.kind is parameter.KEYWORD_ONLY
+}
+"""Options of `signed_distance`; those that differ from these must be options for this kind of source, too."""
 
 
 def distance_to_solid(

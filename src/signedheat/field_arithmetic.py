@@ -205,7 +205,7 @@ class Combinable(Arithmetic):
         return self.with_values(rule(self.values, other.values))
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension; `signedheat.load_field` reads all but ``.vdb``.
+        """Write to a file, in the format given by its extension; `signedheat.read_field` reads all but ``.vdb``.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class Combinable(Arithmetic):
         >>> line = sh.GridField(sh.Grid(0.0, 1.0, 2), [0.0, 1.0])
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     line.save(f"{folder}/line.npz")
-        ...     sh.load_field(f"{folder}/line.npz").values.tolist()
+        ...     sh.read_field(f"{folder}/line.npz").values.tolist()
         [0.0, 1.0]
         """
         files.write_field(self, path)

@@ -4,7 +4,6 @@ from . import batches, constraints, errors, io, methods, morphology, results, sa
 from .curves.curve_completion import close_curves
 from .curves.jumping_distance import piecewise_distance
 from .curves.piecewise_field import PiecewiseField
-from .curves.stroke_directions import curve_orientation
 from .distances import signed_distance
 from .errors import SignedHeatError
 from .foreign import as_shape
@@ -12,7 +11,7 @@ from .grids.grid import Grid
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .grids.redistancing import redistance
-from .io import load_field, read, save
+from .io import read, read_field, save
 from .morphology import offset
 from .sharpening import sharpen
 from .solids.completion import complete
@@ -20,9 +19,9 @@ from .solids.deviations import deviation
 from .solids.holes import fill_holes
 from .solids.implicit_surfaces import contour
 from .solids.mesh_orientation import orient, orientation
-from .solids.sampling import sample
+from .solids.sampling import sample_distances
 from .solids.solid import Solid
-from .solids.thickness import thickness
+from .solids.thickness import wall_thickness
 from .solver import SignedHeatSolver
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay
@@ -42,11 +41,11 @@ MODULES = (batches, constraints, errors, io, methods, morphology, results, sampl
 
 __all__ = [
     "Curve", "DigitalSurface", "Grid", "GridField", "IntrinsicTriangulation", "PiecewiseField", "PointCloud",
-    "PolygonMesh", "Polyline", "SignedHeatError", "SignedHeatSolver", "Solid", "SurfacePoints", "TetField", "TetMesh",
-    "TriangleMesh", "VertexField", "as_shape", "close_curves", "common_subdivision", "complete", "contour",
-    "curve_orientation", "deviation", "fill_holes", "intrinsic_delaunay", "load_field", "offset", "orient",
-    "orientation", "piecewise_distance", "read", "redistance", "sample", "save", "sharpen", "signed_distance",
-    "tetrahedralize", "thickness", "transform",
+    "PolygonMesh", "Polyline", "SignedHeatError", "SignedHeatSolver", "Solid", "SurfacePoints", "TetField",
+    "TetMesh", "TriangleMesh", "VertexField", "as_shape", "close_curves", "common_subdivision", "complete",
+    "contour", "deviation", "fill_holes", "intrinsic_delaunay", "offset", "orient", "orientation",
+    "piecewise_distance", "read", "read_field", "redistance", "sample_distances", "save", "sharpen",
+    "signed_distance", "tetrahedralize", "transform", "wall_thickness",
 ]  # fmt: skip
 
 for _module in MODULES:  # completion in notebooks offers public names only

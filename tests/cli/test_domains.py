@@ -62,7 +62,7 @@ def test_volume_in_the_plane(arcs, capsys, ending):
     options = ["--resolution", "64", "--preview", picture, "--json"]
     summary = json.loads(succeed(capsys, "volume", arcs / f"arcs.{ending}", "-o", out, *options))
     assert len(summary["shape"]) == 2 and max(summary["shape"]) == 64
-    phi = sh.load_field(out)
+    phi = sh.read_field(out)
     np.testing.assert_allclose(phi([[0.3, 0], [1.25, 0], [0, -0.5]]), [-0.7, 0.25, -0.5], atol=0.03)
     assert picture.read_bytes().startswith(b"\x89PNG")
     kept = sh.signed_distance(sh.io.read_polylines(arcs / f"arcs.{ending}"), resolution=64)
@@ -73,7 +73,7 @@ def test_a_grid_of_ones_own_in_the_plane(arcs, capsys):
     out = arcs / "phi.npz"
     own = ["--origin", "-1.5", "-1.25", "--spacing", "0.1", "0.125", "--shape", "31", "21"]
     succeed(capsys, "volume", arcs / "arcs.csv", "-o", out, *own)
-    grid = sh.load_field(out).grid
+    grid = sh.read_field(out).grid
     assert grid.origin.tolist() == [-1.5, -1.25] and grid.shape == (31, 21) and grid.spacing.tolist() == [0.1, 0.125]
 
 
@@ -226,7 +226,7 @@ def test_tets_from_the_command_line(tmp_path, capsys):
     fields = []
     for name, more in (("sharp.vtu", ()), ("plain.vtu", ("--plain",))):
         succeed(capsys, "volume", tmp_path / "ball.stl", *flags, *more, "-o", tmp_path / name)
-        fields.append(sh.load_field(tmp_path / name))
+        fields.append(sh.read_field(tmp_path / name))
     errors = [np.abs(phi.values - np.linalg.norm(phi.mesh.vertices, axis=1) + 1).mean() for phi in fields]
     assert errors[0] < 0.6 * errors[1] < 0.02
     succeed(capsys, "contour", tmp_path / "sharp.vtu", "0.1", "-o", tmp_path / "shell.stl")
@@ -238,7 +238,7 @@ def test_tets_from_the_command_line(tmp_path, capsys):
     fields[0].mesh.save(tmp_path / "own.mesh")
     own = ("--tets", tmp_path / "own.mesh", "--preview", tmp_path / "slices.png")
     succeed(capsys, "volume", tmp_path / "ball.stl", *own, "-o", tmp_path / "own.msh")
-    np.testing.assert_allclose(sh.load_field(tmp_path / "own.msh").values, fields[0].values, atol=1e-9)
+    np.testing.assert_allclose(sh.read_field(tmp_path / "own.msh").values, fields[0].values, atol=1e-9)
     assert matplotlib.image.imread(tmp_path / "slices.png")[..., :3].std() > 0.05
     told = json.loads(succeed(capsys, "info", tmp_path / "own.mesh", "--json"))
     assert told["n_tets"] == fields[0].mesh.n_tets

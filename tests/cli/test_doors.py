@@ -189,7 +189,7 @@ def test_curves_lie_on_the_surface_of_a_solid(tmp_path, capsys):
     sh.io.write_curves([solid.boundary.path([0, 9])], tmp_path / "curve.json", solid.boundary)
     names = [str(tmp_path / name) for name in ("ball.npz", "curve.json", "phi.vtp")]
     assert main(["surface", *names[:2], "-o", names[2], "--quiet"]) == 0
-    assert sh.load_field(names[2]).values.shape == (len(solid.boundary.vertices),)
+    assert sh.read_field(names[2]).values.shape == (len(solid.boundary.vertices),)
 
 
 def test_options_of_completion_are_refused_of_solids(tmp_path, capsys):

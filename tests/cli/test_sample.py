@@ -22,7 +22,7 @@ def test_samples_of_a_shape(tmp_path, ball, capsys):
     options = ["-n", "2000", "--near", "0.5", "--widths", "0.1", "0.01", "--seed", "3"]
     assert main(["sample", ball, "-o", output, *options, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
-    same = sh.sample(sh.read(ball), 2000, near=0.5, widths=[0.1, 0.01], seed=3)
+    same = sh.sample_distances(sh.read(ball), 2000, near=0.5, widths=[0.1, 0.01], seed=3)
     with np.load(output) as arrays:
         np.testing.assert_array_equal(arrays["points"], same.points)
         np.testing.assert_array_equal(arrays["distances"], same.distances)

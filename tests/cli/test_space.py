@@ -50,7 +50,7 @@ def fail(capsys, *arguments, code=1):
 def test_volume(tmp_path, ball, capsys, ending):
     output = str(tmp_path / f"phi.{ending}")
     summary = json.loads(succeed(capsys, "volume", ball, "-o", output, "--resolution", "32", "--json"))
-    phi = sh.load_field(output)
+    phi = sh.read_field(output)
     assert summary["shape"] == list(phi.grid.shape)
     assert max(phi.grid.shape) == 32
     assert abs(phi([[1.2, 0, 0]])[0] - 0.2) < 0.03
@@ -64,11 +64,11 @@ def test_volume_is_sharpened_unless_plain(tmp_path):
     options = ["--resolution", "32", "--quiet", "--diffusion", "4"]
     assert main(["volume", ball, "-o", ours, *options]) == 0
     assert main(["volume", ball, "-o", papers, *options, "--plain"]) == 0
-    plain = sh.load_field(papers)
+    plain = sh.read_field(papers)
     grid = plain.grid
     np.testing.assert_array_equal(plain.values, sh.SignedHeatSolver(grid, diffusion=4.0).distance(sh.read(ball)).values)
     solid = sh.signed_distance(sh.read(ball), grid, diffusion=4.0)
-    np.testing.assert_array_equal(sh.load_field(ours).values, solid.values)
+    np.testing.assert_array_equal(sh.read_field(ours).values, solid.values)
     assert (solid.values != sh.signed_distance(sh.read(ball), grid).values).any()
 
 
@@ -76,14 +76,14 @@ def test_volume_is_sharpened_unless_plain(tmp_path):
 def test_every_constraint_has_a_name(tmp_path, ball, capsys, constraint):
     output = str(tmp_path / "phi.npz")
     succeed(capsys, "volume", ball, "-o", output, "--resolution", "20", "--constraint", constraint, "--plain")
-    assert sh.load_field(output)([[0, 0, 0]])[0] < -0.7
+    assert sh.read_field(output)([[0, 0, 0]])[0] < -0.7
 
 
 def test_volume_on_a_grid_of_ones_own(tmp_path, ball, capsys):
     output = str(tmp_path / "phi.npz")
     own = ["--origin", "-1.5", "-1.6", "-1.7", "--spacing", "0.2", "0.25", "0.3", "--shape", "16", "14", "12"]
     succeed(capsys, "volume", ball, "-o", output, *own)
-    grid = sh.load_field(output).grid
+    grid = sh.read_field(output).grid
     assert grid.origin.tolist() == [-1.5, -1.6, -1.7]
     assert grid.spacing.tolist() == [0.2, 0.25, 0.3]
     assert grid.shape == (16, 14, 12)
@@ -92,7 +92,7 @@ def test_volume_on_a_grid_of_ones_own(tmp_path, ball, capsys):
 def test_spacing_and_padding(tmp_path, ball, capsys):
     output = str(tmp_path / "phi.npz")
     succeed(capsys, "volume", ball, "-o", output, "--spacing", "0.125", "--padding", "0.5")
-    grid = sh.load_field(output).grid
+    grid = sh.read_field(output).grid
     assert grid.spacing.tolist() == [0.125] * 3
     assert (grid.origin <= -1.5 + 0.05).all()
 
@@ -241,7 +241,7 @@ def test_demo_needs_no_file(tmp_path, capsys):
     assert "faces turned" in err and "of the surface is completed" in err
     assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == sorted(map(os.path.basename, summary["files"]))
     assert inspect(sh.read(tmp_path / "demo" / "offset.stl")).is_closed
-    assert sh.load_field(tmp_path / "demo" / "distance.vti").values.min() < -0.2
+    assert sh.read_field(tmp_path / "demo" / "distance.vti").values.min() < -0.2
 
 
 def test_quiet_prints_nothing(tmp_path, ball, capsys):
@@ -284,7 +284,7 @@ def test_bands_are_written_and_contoured(tmp_path, ball, capsys):
     summary = json.loads(succeed(capsys, "volume", ball, "-o", output, *options, "--json"))
     assert summary["band"] == 0.2
     assert summary["nodes"] == 512 * summary["blocks"]
-    band = sh.load_field(output)
+    band = sh.read_field(output)
     assert band.blocks is not None
     assert abs(band([[1.1, 0, 0]])[0] - 0.1) < 0.02
     succeed(capsys, "contour", output, "0.1", "-o", surface)
@@ -307,7 +307,7 @@ def test_tiles_go_on_where_they_were_and_give_what_the_band_gives(tmp_path, ball
         notes.append(json.loads(told)["notes"]["tiles_computed"])
     assert notes[0]["reused"] == 0 and notes[1]["reused"] == notes[1]["tiles"] == notes[0]["tiles"] > 1
     succeed(capsys, "volume", ball, "-o", other, *options, "--quiet")
-    tiled, single = sh.load_field(output), sh.load_field(other)
+    tiled, single = sh.read_field(output), sh.read_field(other)
     np.testing.assert_array_equal(tiled.values, single.values)
     np.testing.assert_array_equal(tiled.blocks.places, single.blocks.places)
     assert "another" in fail(capsys, "volume", ball, "-o", output, *options[:-1], "0.16", "--tiles", store)

@@ -44,7 +44,7 @@ def test_all_pieces_of_one_curve_agree(lost, seed):
     pieces = broken(mesh.level_set(wave(mesh))[0], lost, 12, rng)
     wrong = np.isin(np.arange(len(pieces)), rng.permutation(len(pieces))[:3])
     given = [piece.reversed() if turn else piece for piece, turn in zip(pieces, wrong, strict=True)]
-    found = sh.curve_orientation(given, mesh)
+    found = sh.orientation(given, mesh)
     assert (found.turned == wrong).all()
     assert all(map(same, sh.orient(given, mesh), pieces))
     assert found.agreement.min() >= 0 and found.agreement.max() <= 1
@@ -57,7 +57,7 @@ def test_without_gaps_the_pieces_agree_all_but_perfectly():
     runs = [np.arange(a, b + 1) % curve.n_points for a, b in pairwise(cuts)]
     pieces = [sh.Curve(curve.faces[run], curve.barycentric[run]) for run in runs]
     spurious = mesh.path(mesh.edges.vertices[0])
-    found = sh.curve_orientation([*pieces, spurious], mesh)
+    found = sh.orientation([*pieces, spurious], mesh)
     assert found.agreement[:-1].min() > 0.9  # what lies beyond an end is on both sides of it
     assert found.agreement[-1] < 0.2
     assert found.agreeing(0.5) == found.curves[:-1]
@@ -75,7 +75,7 @@ def test_curves_apart_face_each_other(opposite):
             pieces.append(piece.reversed() if backward else piece)
     wrong = np.isin(np.arange(8), [1, 6])
     given = [piece.reversed() if turn else piece for piece, turn in zip(pieces, wrong, strict=True)]
-    found = sh.curve_orientation(given, mesh).turned
+    found = sh.orientation(given, mesh).turned
     if opposite:
         assert (found == wrong).all()
     else:
@@ -89,7 +89,7 @@ def test_what_has_no_direction_or_no_end_stays():
     whole, alone = mesh.level_set(mesh.vertices[:, 2] - 0.501)[0], mesh.path([0, 5])
     given = [whole.reversed(), mesh.path([1, 6], oriented=False), mesh.points_at(9), alone]
     assert sh.orient(given, mesh) == given
-    assert not sh.curve_orientation(given, mesh).turned.any()
+    assert not sh.orientation(given, mesh).turned.any()
 
 
 def test_given_normals_turn_instead_of_the_direction():
@@ -102,7 +102,7 @@ def test_given_normals_turn_instead_of_the_direction():
         at = np.einsum("nk,nkd->nd", drawn.barycentric, mesh.vertices[mesh.faces[drawn.faces]])
         normals = outward * 0.5 * (at[1:] + at[:-1])
         pieces.append(sh.Curve(drawn.faces, drawn.barycentric, normals=normals))
-    found = sh.curve_orientation(pieces, mesh)
+    found = sh.orientation(pieces, mesh)
     assert found.turned.tolist() == [False, True, False, False]
     assert np.allclose(found.curves[1].normals, -pieces[1].normals)
     assert same(found.curves[1], pieces[1])
@@ -123,12 +123,12 @@ def test_on_every_surface(domain):
     pieces[2] = pieces[2].reversed()
     if domain == "intrinsic":
         mesh = sh.intrinsic_delaunay(mesh)
-    assert sh.curve_orientation(pieces, mesh).turned.tolist() == [k == 2 for k in range(len(pieces))]
+    assert sh.orientation(pieces, mesh).turned.tolist() == [k == 2 for k in range(len(pieces))]
 
 
 def test_only_surfaces_have_curves():
     with pytest.raises(sh.errors.UnsupportedTypeError) as caught:
-        sh.curve_orientation([], sh.Grid((0, 0), 1.0, (3, 3)))
+        sh.orientation([], sh.Grid((0, 0), 1.0, (3, 3)))
     assert caught.value.element == "domain"
 
 

@@ -101,7 +101,7 @@ def test_no_piece_is_left_out_where_half_of_the_curve_is_gone(seed):
 def test_lines_from_rim_to_rim_are_complete(mesh):
     """Parallel lines that face the same way contradict each other between them; they are taken as they are."""
     lines = [mesh.level_set(mesh.vertices[:, 0] - x)[0] for x in (-0.31, 0.32)]
-    found = sh.curve_orientation(lines, mesh)
+    found = sh.orientation(lines, mesh)
     assert not found.turned.any()
     assert (found.agreement == 1).all()
 
@@ -143,11 +143,11 @@ def test_orienting_keeps_rings_that_face_each_other_too():
     mesh = tube()
     pieces = rings(mesh, 0.6, 3, 0.4)
     given = [pieces[0], pieces[1].reversed(), *pieces[2:]]
-    assert sh.curve_orientation(pieces, mesh).turned.tolist() == [False] * 6
-    assert sh.curve_orientation(given, mesh).turned.tolist() == [False, True, False, False, False, False]
+    assert sh.orientation(pieces, mesh).turned.tolist() == [False] * 6
+    assert sh.orientation(given, mesh).turned.tolist() == [False, True, False, False, False, False]
 
 
 def test_rings_nearer_than_their_gaps_are_long():
     """Three pieces each, with gaps nearly three times as long as the rings are apart: taken as they are drawn."""
     mesh = tube()
-    assert not sh.curve_orientation(rings(mesh, 0.3, 3, 0.4), mesh).turned.any()
+    assert not sh.orientation(rings(mesh, 0.3, 3, 0.4), mesh).turned.any()

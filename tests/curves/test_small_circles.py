@@ -64,7 +64,7 @@ def test_each_is_turned_and_closed_by_one_loop():
     mesh, radius = sphere(3), 0.06
     centers = centers_on_sphere(8, 3 * radius)
     given, wrong = circles(mesh, centers, radius, 4, 0.3)
-    assert (sh.curve_orientation(given, mesh).turned == wrong).all()
+    assert (sh.orientation(given, mesh).turned == wrong).all()
     found = sh.close_curves(given, mesh)
     assert len(found) == 8 and all(curve.closed for curve in found)
     for curve in found:
@@ -87,7 +87,7 @@ def test_complete_circles_tell_how_broken_ones_face(pieces):
             broken.append(
                 mesh.polyline(c + 0.12 * np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)[::-1])
             )
-    found = sh.curve_orientation([*whole, *broken], mesh)
+    found = sh.orientation([*whole, *broken], mesh)
     assert found.turned.tolist() == [False] * 4 + [True] * len(broken)
     with pytest.warns(InexactWarning, match="ran against about as much of the others"):
         phi = sh.signed_distance([*whole, *broken], mesh)

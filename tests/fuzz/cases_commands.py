@@ -299,7 +299,7 @@ def _judge_file(path: Path, told: str) -> None:
     try:
         if path.suffix in (".npz", ".vti", ".nrrd", ".npy") and "out" in path.name:
             found = np.load(path) if path.suffix == ".npz" else None
-            numbers = _values(sh.load_field(path)) if found is None or "distances" not in found else found["distances"]
+            numbers = _values(sh.read_field(path)) if found is None or "distances" not in found else found["distances"]
         elif path.suffix in (".stl", ".ply", ".off", ".obj", ".vtp"):
             read: Any = sh.read(path)
             numbers = getattr(read, "vertices", np.zeros(0))

@@ -202,7 +202,7 @@ def solids() -> list[Files]:
 
 def load_and_ask(path: Path) -> np.ndarray:
     """A solid from a file answers points, whatever numbers it holds."""
-    return sh.io.load(path).distance([[0.1, 0.2, 0.3], [2.0, 0.0, 0.0]])
+    return sh.read(path).distance([[0.1, 0.2, 0.3], [2.0, 0.0, 0.0]])
 
 
 @cache
@@ -330,8 +330,8 @@ KINDS: dict[str, tuple[Callable[[Path], Any], Callable[[], list[Files]]]] = {
     "glTF": (sh.read, gltf),
     "scenes": (sh.read, scenes),
     "tets": (sh.read, tets),
-    "tet fields": (sh.load_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
-    "fields": (sh.load_field, fields),
+    "tet fields": (sh.read_field, lambda: [f for f in tets() if b"signed_distance" in next(iter(f.values()))]),
+    "fields": (sh.read_field, fields),
     "solids": (load_and_ask, solids),
     "volumes": (sh.read, volumes),
     "labels": (read_labelled, labels),

@@ -49,7 +49,7 @@ def check_queries(given: Subject) -> str:
         found, _ = announced(lambda: phi.closest(places))
         judge(found.distances, warned, 100 * size, "distances of nearest places")
         return "nearest places"
-    made, _ = announced(lambda: sh.sample(phi, int(random.integers(1, 50))))
+    made, _ = announced(lambda: sh.sample_distances(phi, int(random.integers(1, 50))))
     judge(made.distances, warned, 100 * size, "distances of samples")
     judge(made.gradients, warned, 10.0, "gradients of samples")
     return "samples"

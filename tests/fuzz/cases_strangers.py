@@ -176,7 +176,7 @@ def one_changed(random: np.random.Generator, arrays: dict[str, np.ndarray]) -> s
 
 def use(subject: Loaded) -> str:
     """It is refused, or it answers with numbers."""
-    loaded = sh.io.load(subject.path)
+    loaded = sh.read(subject.path)
     points = np.random.default_rng(0).normal(size=(50, 3))
     distances = loaded.distance(points)
     closest = loaded.closest(points)

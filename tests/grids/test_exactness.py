@@ -30,7 +30,7 @@ def test_multiples_are_exact(tmp_path, name, field):
     change, factor = SCALED[name]
     changed = change(field)
     changed.save(tmp_path / "f.npz")
-    for result in (changed, sh.load_field(tmp_path / "f.npz")):
+    for result in (changed, sh.read_field(tmp_path / "f.npz")):
         np.testing.assert_array_equal(result(POINTS), factor * EXACT)
         np.testing.assert_allclose(result.values, factor * field.values, rtol=1e-6)
         np.testing.assert_array_equal(result.gradient(POINTS), factor * PLATE.closest(POINTS).gradients)
@@ -51,12 +51,12 @@ def test_saved_fields_are_the_same_to_the_last_bit(tmp_path):
     broken = samples.with_flipped_faces(samples.without_patches(samples.sphere(3), 3, 0.3), 0.1)
     field = sh.signed_distance(broken, resolution=16)
     field.save(tmp_path / "ball.npz")
-    again = sh.load_field(tmp_path / "ball.npz")
+    again = sh.read_field(tmp_path / "ball.npz")
     points = np.random.default_rng(1).uniform(*field.solid.bounds, (300, 3))
     for one, other in zip(vars(field.closest(points)).values(), vars(again.closest(points)).values(), strict=True):
         np.testing.assert_array_equal(one, other)
     np.testing.assert_array_equal(again.values, field.values)
-    assert sh.sample(again, 10).distances.tolist() == sh.sample(field, 10).distances.tolist()
+    assert sh.sample_distances(again, 10).distances.tolist() == sh.sample_distances(field, 10).distances.tolist()
 
 
 @pytest.mark.parametrize(
@@ -71,4 +71,4 @@ def test_what_is_not_exact_any_more_says_so(change):
 @pytest.mark.parametrize("ending", [".vti", ".npy", ".nrrd"])
 def test_formats_of_values_alone_say_so(tmp_path, ending):
     FIELD.save(tmp_path / f"f{ending}")
-    assert "interpolated" in repr(sh.load_field(tmp_path / f"f{ending}"))
+    assert "interpolated" in repr(sh.read_field(tmp_path / f"f{ending}"))

@@ -155,7 +155,7 @@ def test_field_in_the_plane(tmp_path):
     np.testing.assert_allclose(phi.gradient(points), points / radius[:, None], atol=0.12)
     for ending in ("npz", "vti", "nrrd", "npy"):
         phi.save(tmp_path / f"phi.{ending}")
-        again = sh.load_field(tmp_path / f"phi.{ending}")
+        again = sh.read_field(tmp_path / f"phi.{ending}")
         np.testing.assert_array_equal(again.values, phi.values)
         np.testing.assert_array_equal(again.grid.origin, phi.grid.origin)
     view.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])

@@ -7,7 +7,7 @@ import pytest
 
 import signedheat as sh
 from refusals import refused
-from signedheat.io import load_field
+from signedheat.io import read_field
 
 FORMATS = ["npz", "npy", "nrrd", "vti"]
 
@@ -23,7 +23,7 @@ def test_confidence_comes_back(tmp_path, ending):
     phi = field()
     told = sh.GridField(phi.grid, phi.values, confidence=np.linspace(0, 1, phi.values.size).reshape(phi.values.shape))
     told.save(tmp_path / f"phi.{ending}")
-    back = load_field(tmp_path / f"phi.{ending}")
+    back = read_field(tmp_path / f"phi.{ending}")
     np.testing.assert_array_equal(back.values, phi.values)
     np.testing.assert_array_equal(back.confidence, told.confidence)
     with refused(sh.errors.GeometryError, element="confidence"):
@@ -73,7 +73,7 @@ def test_we_read_vti_of_vtk(tmp_path, mode, compressor):
     getattr(writer, f"SetDataModeTo{mode}")()
     getattr(writer, f"SetCompressorTypeTo{compressor}")()
     writer.Write()
-    back = load_field(tmp_path / "a.vti")
+    back = read_field(tmp_path / "a.vti")
     np.testing.assert_array_equal(back.values, phi.values)
     np.testing.assert_allclose(back.grid.spacing, phi.grid.spacing, rtol=1e-5)
 
@@ -93,7 +93,7 @@ def test_nrrd_along_turned_axes_is_refused(tmp_path):
     header = {"space dimension": 3, "space directions": turned, "space origin": np.zeros(3)}
     nrrd.write(str(tmp_path / "turned.nrrd"), field().values, header, index_order="F")
     with refused(sh.errors.FileFormatError):
-        load_field(tmp_path / "turned.nrrd")
+        read_field(tmp_path / "turned.nrrd")
 
 
 @pytest.mark.parametrize("ending", FORMATS)
@@ -104,7 +104,7 @@ def test_truncated_fields_are_refused_by_name(tmp_path, ending):
     for length in (0, 10, len(data) // 2, len(data) - 60):
         (tmp_path / f"phi.{ending}").write_bytes(data[:length])
         with refused(sh.errors.FileFormatError, file=f"phi.{ending}"):
-            load_field(tmp_path / f"phi.{ending}")
+            read_field(tmp_path / f"phi.{ending}")
 
 
 def test_files_that_hold_no_field_are_refused(tmp_path):
@@ -115,15 +115,15 @@ def test_files_that_hold_no_field_are_refused(tmp_path):
     np.savez(tmp_path / "words.npz", values=np.array([["a", "b"]] * 2), origin=[0, 0], spacing=[1, 1])
     for name in ("other.npz", "pickled.npz", "spacing.npz", "words.npz", "missing.vti", "field.stl"):
         with refused(sh.errors.FileFormatError, file=name):
-            load_field(tmp_path / name)
+            read_field(tmp_path / name)
     with refused(sh.errors.FileFormatError):
-        load_field(tmp_path / "alone.npy")
+        read_field(tmp_path / "alone.npy")
 
 
 def test_fields_of_four_dimensions_fit_npz_only(tmp_path):
     phi = sh.GridField(sh.Grid((0, 0, 0, 0), 1.0, (2, 3, 2, 4)), np.arange(48.0).reshape(2, 3, 2, 4))
     phi.save(tmp_path / "phi.npz")
-    np.testing.assert_array_equal(load_field(tmp_path / "phi.npz").values, phi.values)
+    np.testing.assert_array_equal(read_field(tmp_path / "phi.npz").values, phi.values)
     with refused(sh.errors.FileFormatError):
         phi.save(tmp_path / "phi.vti")
 
@@ -137,7 +137,7 @@ def test_bands_whose_blocks_lie_nowhere(tmp_path, places):
     arrays["places"] = np.array(places, dtype=np.array(places).dtype)
     np.savez(tmp_path / "band.npz", **arrays)
     with refused(sh.errors.FileFormatError):
-        load_field(tmp_path / "band.npz")
+        read_field(tmp_path / "band.npz")
 
 
 def test_bands_in_another_order_of_bytes(tmp_path):
@@ -147,7 +147,7 @@ def test_bands_in_another_order_of_bytes(tmp_path):
         arrays = dict(file)
     np.savez(tmp_path / "band.npz", **arrays | {"values": arrays["values"].astype(">f8")})
     points = band.grid.points.reshape(-1, 3)[::50]
-    np.testing.assert_array_equal(load_field(tmp_path / "band.npz")(points), band(points))
+    np.testing.assert_array_equal(read_field(tmp_path / "band.npz")(points), band(points))
 
 
 @pytest.mark.parametrize("version", [np.nan, np.inf, -1, "one", [1, 2]])
@@ -157,4 +157,4 @@ def test_solids_of_odd_versions(tmp_path, version):
         arrays = dict(file)
     np.savez(tmp_path / "solid.npz", **arrays | {"solid_version": version})
     with refused(sh.errors.FileFormatError):
-        sh.io.load(tmp_path / "solid.npz")
+        sh.read(tmp_path / "solid.npz")

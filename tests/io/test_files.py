@@ -38,7 +38,7 @@ def leftovers(folder):
 def test_pipes_and_devices_are_not_read(tmp_path, ending):
     pipe = tmp_path / f"pipe.{ending}"
     os.mkfifo(pipe)
-    read = {"npz": sh.load_field, "nrrd": sh.load_field, "svg": sh.io.read_polylines}.get(ending, sh.read)
+    read = {"npz": sh.read_field, "nrrd": sh.read_field, "svg": sh.io.read_polylines}.get(ending, sh.read)
     with pytest.raises(sh.errors.FileFormatError) as caught:
         read(pipe)
     assert caught.value.path is not None and caught.value.remedy
@@ -124,7 +124,7 @@ def nrrd(folder, name, extra, data=b""):
 def test_packed_files_of_several_members_are_read_to_the_end(tmp_path, encoding, pack):
     data = np.arange(8.0).tobytes()
     path = nrrd(tmp_path, "packed.nrrd", f"encoding: {encoding}\n", pack(data[:20]) + pack(b"") + pack(data[20:]))
-    assert sh.load_field(path).values.ravel(order="F").tolist() == list(range(8))
+    assert sh.read_field(path).values.ravel(order="F").tolist() == list(range(8))
 
 
 @posix
@@ -137,10 +137,10 @@ def test_an_image_names_files_in_its_folder_only(tmp_path):
     os.mkfifo(inner / "pipe.raw")
     (inner / "link.raw").symlink_to(tmp_path / "data.raw")
     good = nrrd(inner, "good.nrrd", "encoding: raw\ndata file: data.raw\n")
-    np.testing.assert_array_equal(sh.load_field(good).values.ravel(order="F"), values)
+    np.testing.assert_array_equal(sh.read_field(good).values.ravel(order="F"), values)
     for name in (tmp_path / "data.raw", "../data.raw", "pipe.raw", "link.raw", "absent.raw"):
         with pytest.raises(sh.errors.FileFormatError):
-            sh.load_field(nrrd(inner, "bad.nrrd", f"encoding: raw\ndata file: {name}\n"))
+            sh.read_field(nrrd(inner, "bad.nrrd", f"encoding: raw\ndata file: {name}\n"))
 
 
 def packed_vtk(n_bytes):
@@ -181,7 +181,7 @@ def test_no_more_is_unpacked_than_is_announced(tmp_path, ending):
     path = bomb(tmp_path, ending)
     assert path.stat().st_size < 1_500_000
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    read = sh.read if ending in ("vtp", "vtu") else sh.load_field
+    read = sh.read if ending in ("vtp", "vtu") else sh.read_field
     try:
         read(path)
     except sh.errors.SignedHeatError as error:
@@ -196,7 +196,7 @@ def test_what_is_announced_is_compared_with_the_memory_that_is_free(tmp_path, en
     field.save(tmp_path / f"phi.{ending}")
     monkeypatch.setattr(files, "available_memory", lambda: 8 * 40**3 - 1)
     with pytest.raises(sh.errors.MemoryLimitError) as caught:
-        sh.load_field(tmp_path / f"phi.{ending}")
+        sh.read_field(tmp_path / f"phi.{ending}")
     assert caught.value.remedy and caught.value.path
 
 
@@ -206,7 +206,7 @@ def test_arrays_that_announce_more_than_there_is(tmp_path, shape):
     (tmp_path / "phi.npy").write_bytes(b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + head.encode() + bytes(64))
     (tmp_path / "phi.json").write_text(json.dumps({"origin": [0, 0], "spacing": [1, 1]}))
     with pytest.raises(sh.errors.SignedHeatError) as caught:
-        sh.load_field(tmp_path / "phi.npy")
+        sh.read_field(tmp_path / "phi.npy")
     assert caught.value.path
 
 
@@ -332,7 +332,7 @@ def test_odd_fields(tmp_path, name):
     else:
         (tmp_path / name).write_bytes(content.encode("latin-1"))
     with pytest.raises(sh.errors.FileFormatError) as caught:
-        sh.load_field(tmp_path / name)
+        sh.read_field(tmp_path / name)
     assert caught.value.path == str(tmp_path / name)
 
 

@@ -28,7 +28,7 @@ def test_what_meshio_writes_is_read(tmp_path, capsys, version, binary):
     np.testing.assert_array_equal(found.tets, BOX.tets)
     np.testing.assert_array_equal(found.vertices, BOX.vertices)
     if has_values:
-        np.testing.assert_array_equal(sh.load_field(tmp_path / "box.msh").values, VALUES)
+        np.testing.assert_array_equal(sh.read_field(tmp_path / "box.msh").values, VALUES)
 
 
 def text(nodes: str, elements: str, version: str = "2.2") -> bytes:

@@ -122,7 +122,7 @@ def test_straight_images_can_be_saved_as_any_field(tmp_path, labels):
     mask, output = tmp_path / "mask.nrrd", tmp_path / "phi.vti"
     write_nrrd(mask, labels, AXES["straight"])
     assert main(["volume", str(mask), "--label", "3", "-o", str(output), "--quiet"]) == 0
-    field = sh.load_field(output)
+    field = sh.read_field(output)
     np.testing.assert_allclose(field.grid.origin, ORIGIN)
     assert field([ORIGIN + STEPS * CENTER])[0] < -1.2
 

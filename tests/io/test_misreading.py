@@ -419,13 +419,13 @@ def test_images_of_vtk_have_the_values_that_they_show(tmp_path):
     image.point_data["mask"], image.point_data["distance"] = np.ones(60), np.arange(60.0)
     image.set_active_scalars("distance")
     image.save(tmp_path / "a.vti")
-    assert sh.load_field(tmp_path / "a.vti").values.ravel(order="F").tolist() == list(range(60))
+    assert sh.read_field(tmp_path / "a.vti").values.ravel(order="F").tolist() == list(range(60))
 
 
 @pytest.mark.parametrize("name", [None, 3, b"a.stl", ["a.stl"]])
 def test_what_is_no_name_of_a_file_is_refused(name):
     ball = samples.sphere(0)
-    for use in (sh.read, sh.load_field, sh.io.load, ball.save, sh.io.read_polylines):
+    for use in (sh.read, sh.read_field, ball.save, sh.io.read_polylines):
         with refused(sh.SignedHeatError):
             use(name)
 

@@ -56,7 +56,7 @@ def test_fields_on_grids(folder, ending, seed, shape, scale):
     grid = sh.Grid(scale * rng.normal(size=dimension), scale * rng.uniform(0.1, 1, dimension), shape)
     field = sh.GridField(grid, scale * rng.normal(size=shape))
     field.save(folder / f"field.{ending}")
-    back = sh.load_field(folder / f"field.{ending}")
+    back = sh.read_field(folder / f"field.{ending}")
     np.testing.assert_array_equal(back.values, field.values)
     np.testing.assert_array_equal(back.grid.origin, grid.origin)
     np.testing.assert_array_equal(back.grid.spacing, grid.spacing)

@@ -23,14 +23,14 @@ def test_values_and_vertices_come_back(tmp_path, name, ending):
     n = len(domain.points if name == "points" else domain.vertices)
     field = sh.VertexField(domain, np.random.default_rng(0).normal(size=n))
     field.save(tmp_path / f"phi.{ending}")
-    back = sh.load_field(tmp_path / f"phi.{ending}")
+    back = sh.read_field(tmp_path / f"phi.{ending}")
     assert type(back.domain) is type(domain) and np.array_equal(back.values, field.values)
 
 
 def test_clouds_come_back_with_what_their_triangles_are_made_of(tmp_path):
     cloud = sh.PointCloud(SQUARE, normals=5 * [[0, 0, 1]], areas=np.arange(1.0, 6), n_neighbors=4)
     sh.VertexField(cloud, np.zeros(5)).save(tmp_path / "phi.npz")
-    back = sh.load_field(tmp_path / "phi.npz").domain
+    back = sh.read_field(tmp_path / "phi.npz").domain
     assert back.n_neighbors == 4 and np.array_equal(back.normals, cloud.normals)
     assert np.array_equal(back.areas, cloud.areas)
 
@@ -40,5 +40,5 @@ def test_shapes_without_values_are_no_fields_but_are_looked_at(tmp_path, ending)
     path = tmp_path / f"ball.{ending}"
     samples.sphere(1).save(path)
     with refused(sh.errors.FileFormatError):
-        sh.load_field(path)
+        sh.read_field(path)
     assert main(["view", str(path), "-o", str(tmp_path / "ball.png")]) == 0

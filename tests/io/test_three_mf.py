@@ -104,9 +104,9 @@ def test_units_of_drawings(tmp_path):
     path.write_text("0,0\n1,0\n1,1\n0,1\n0,0\n")
     arguments = ["volume", str(path), "-o", str(output), "--resolution", "8", "--quiet"]
     assert main(arguments) == 0
-    inner = sh.load_field(output).values.min()
+    inner = sh.read_field(output).values.min()
     assert main([*arguments, "--units", "cm:mm"]) == 0
-    assert sh.load_field(output).values.min() == pytest.approx(10 * inner)
+    assert sh.read_field(output).values.min() == pytest.approx(10 * inner)
     assert main([*arguments, "--transform", *"1 0 0 0 0 1 0 0 0 0 1 0".split()]) == 1
 
 
@@ -125,7 +125,7 @@ def test_transforms_on_the_command_line(tmp_path, ball, capsys):
         assert main([*arguments, "--transform", *words]) == 0
         note = json.loads(capsys.readouterr().out)["notes"].get("shape_oriented", {"turned_faces": 0})
         assert note["turned_faces"] == 0  # mirrored, and still outside out
-        outputs.append(sh.load_field(output))
+        outputs.append(sh.read_field(output))
     assert all((field.values == outputs[0].values).all() for field in outputs)
     assert outputs[0]([[7.0, 0, 0]])[0] == pytest.approx(-2, abs=0.3)
     for wrong in (["1", "2"], ["a"] * 16, [str(tmp_path / "nowhere.txt")], ["0"] * 12):

@@ -114,7 +114,7 @@ def test_dense_fields_keep_single_precision_and_unknown_nodes(tmp_path):
 def test_they_are_not_read_and_nothing_else_is_written(tmp_path, band):
     band.save(tmp_path / "band.vdb")
     with refused(sh.errors.FileFormatError, file="band.vdb"):
-        sh.load_field(tmp_path / "band.vdb")
+        sh.read_field(tmp_path / "band.vdb")
     with refused(sh.errors.FileFormatError, file="band.vti"):
         write_vdb(band, tmp_path / "band.vti")
 
@@ -123,7 +123,7 @@ def test_bands_as_images_have_all_nodes(tmp_path):
     solid = sh.complete(sphere(500))
     band = solid.field(resolution=45, band=0.2)
     band.save(tmp_path / "band.vti")
-    image = sh.load_field(tmp_path / "band.vti")
+    image = sh.read_field(tmp_path / "band.vti")
     exact = np.clip(solid.distance(band.grid.points.reshape(-1, 3)).reshape(band.grid.shape), -0.2, 0.2)
     np.testing.assert_allclose(image.values, exact, atol=1e-6)
     np.testing.assert_array_equal(image.grid.spacing, band.grid.spacing)

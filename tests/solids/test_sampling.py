@@ -30,7 +30,7 @@ def holed():
 
 
 def test_distances_are_exact_and_gradients_theirs(box):
-    taken = sh.sample(box, 20_000, near=0.5, widths=[0.2, 0.01])
+    taken = sh.sample_distances(box, 20_000, near=0.5, widths=[0.2, 0.01])
     np.testing.assert_allclose(taken.distances, exact_distance(taken.points), atol=1e-12)
     assert not taken.completed.any()
     np.testing.assert_allclose(np.linalg.norm(taken.gradients, axis=1), 1, atol=1e-12)
@@ -45,7 +45,7 @@ def test_distances_are_exact_and_gradients_theirs(box):
 
 def test_shares_and_widths(box):
     widths = [0.3, 0.02, 0.0]
-    taken = sh.sample(box, 30_000, near=0.75, widths=widths)
+    taken = sh.sample_distances(box, 30_000, near=0.75, widths=widths)
     assert taken.near.sum() == 22_500 and taken.near[:22_500].all()
     assert taken.center == pytest.approx(CORNER + SIZE / 2)
     assert taken.radius == pytest.approx(np.linalg.norm(SIZE) / 2)
@@ -59,7 +59,7 @@ def test_shares_and_widths(box):
 
 
 def test_places_are_even_by_area(box):
-    taken = sh.sample(box, 11_000, near=1.0, widths=[0.0])
+    taken = sh.sample_distances(box, 11_000, near=1.0, widths=[0.0])
     on = [np.abs(taken.points[:, axis] - CORNER[axis]) < 1e-9 for axis in range(3)]
     # 22 units of area, of which the lowest faces along x, y, z have 6, 3, 2; one point in each 11,000th of it
     assert [int(side.sum()) for side in on] == pytest.approx([3000, 1500, 1000], abs=4)
@@ -71,7 +71,7 @@ def test_missing_surface_is_sampled_on_the_completed_one():
     made, given = solid.completion.face_areas.sum(), solid.faces.face_areas.sum()
     # the lid over the hole is at least the flat disk of radius .8, at most the cap that is missing, 2π · .4
     assert 0.9 * np.pi * 0.64 < made < 1.1 * 2 * np.pi * 0.4
-    taken = sh.sample(solid.field(40), 4000, near=1.0, widths=[0.0])
+    taken = sh.sample_distances(solid.field(40), 4000, near=1.0, widths=[0.0])
     assert taken.completed.mean() == pytest.approx(made / (made + given), rel=0.1)
     assert np.abs(taken.distances).max() < 1e-12
 
@@ -82,7 +82,7 @@ def _above(mesh, height):
 
 def test_an_open_sheet_has_one_sign():
     sheet = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]], [[0, 1, 2], [1, 3, 2]])
-    taken = sh.sample(sh.signed_distance(sheet, resolution=24), 2000)
+    taken = sh.sample_distances(sh.signed_distance(sheet, resolution=24), 2000)
     assert (taken.distances >= 0).all()
     np.testing.assert_allclose(
         taken.distances, np.linalg.norm(taken.points - np.clip(taken.points, 0, [1, 1, 0]), axis=1), atol=1e-12
@@ -90,7 +90,11 @@ def test_an_open_sheet_has_one_sign():
 
 
 def test_the_same_seed_gives_the_same_bits(box, holed):
-    one, other, third = sh.sample(holed, 500, seed=1), sh.sample(holed, 500, seed=1), sh.sample(holed, 500, seed=2)
+    one, other, third = (
+        sh.sample_distances(holed, 500, seed=1),
+        sh.sample_distances(holed, 500, seed=1),
+        sh.sample_distances(holed, 500, seed=2),
+    )
     np.testing.assert_array_equal(one.points, other.points)
     np.testing.assert_array_equal(one.distances, other.distances)
     assert not np.isin(one.points, third.points).any()
@@ -98,7 +102,7 @@ def test_the_same_seed_gives_the_same_bits(box, holed):
 
 @pytest.mark.parametrize("layout", ["arrays", "deepsdf"])
 def test_files(tmp_path, box, layout):
-    taken = sh.sample(box, 3000, near=0.9).normalized()
+    taken = sh.sample_distances(box, 3000, near=0.9).normalized()
     taken.save(tmp_path / "box.npz", layout)
     with np.load(tmp_path / "box.npz", allow_pickle=False) as file:
         arrays = dict(file)
@@ -126,7 +130,7 @@ def taken_below(taken):
 def test_what_cannot_be_sampled_says_so(tmp_path, box):
     plain = sh.GridField(box.grid, box.values)
     with pytest.raises(sh.errors.SourceError) as caught:
-        sh.sample(plain, 10)
+        sh.sample_distances(plain, 10)
     assert "signed_distance" in caught.value.remedy
     for wrong in (
         {"n": 0},
@@ -141,17 +145,17 @@ def test_what_cannot_be_sampled_says_so(tmp_path, box):
         {"seed": "one"},
     ):
         with pytest.raises(sh.errors.SignedHeatError):
-            sh.sample(box, **{"n": 10, **wrong})
-    assert not sh.sample(box, 10, near=0, widths=[]).near.any()
+            sh.sample_distances(box, **{"n": 10, **wrong})
+    assert not sh.sample_distances(box, 10, near=0, widths=[]).near.any()
     with pytest.raises(sh.errors.FileFormatError):
-        sh.sample(box, 10).save(tmp_path / "samples.txt")
+        sh.sample_distances(box, 10).save(tmp_path / "samples.txt")
     assert NOISE_WIDTHS[0] ** 2 == pytest.approx(10 * NOISE_WIDTHS[1] ** 2, rel=0.01)
 
 
 def test_numbers_of_samples_that_make_no_sense_or_do_not_fit_are_refused(box):
     for n in (0, -3, 2.5, "many", None, np.nan, True):
         with refused(sh.errors.SignedHeatError, "the number of samples"):
-            sh.sample(box, n)
+            sh.sample_distances(box, n)
     for n in (10**15, 10**30):
         with pytest.raises(sh.errors.MemoryLimitError):
-            sh.sample(box, n)
+            sh.sample_distances(box, n)

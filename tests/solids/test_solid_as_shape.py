@@ -74,8 +74,12 @@ def test_methods_are_the_functions():
     np.testing.assert_array_equal(
         SOLID.offset(0.1, resolution=20).vertices, sh.offset(BROKEN, 0.1, resolution=20).vertices
     )
-    np.testing.assert_array_equal(SOLID.sample(100, seed=3).distances, sh.sample(SOLID, 100, seed=3).distances)
-    np.testing.assert_array_equal(sh.sample(BROKEN, 100).points, sh.sample(SOLID.field(16), 100).points)
+    np.testing.assert_array_equal(
+        SOLID.sample(100, seed=3).distances, sh.sample_distances(SOLID, 100, seed=3).distances
+    )
+    np.testing.assert_array_equal(
+        sh.sample_distances(BROKEN, 100).points, sh.sample_distances(SOLID.field(16), 100).points
+    )
     np.testing.assert_array_equal(sh.deviation(POINTS, SOLID).distances, SOLID.distance(POINTS))
     assert len(sh.deviation(SOLID, SOLID).distances) == SOLID.boundary.n_vertices
     grown = sh.morphology.dilate(SOLID, 0.2, resolution=20)
@@ -107,7 +111,7 @@ def test_files_have_the_solid_or_its_surface(tmp_path, save):
     assert surface.to_trimesh().is_watertight
     assert surface.to_trimesh().volume == pytest.approx(SOLID.volume, rel=1e-6)
     save(SOLID, tmp_path / "ball.npz")
-    np.testing.assert_array_equal(sh.io.load(tmp_path / "ball.npz").distance(POINTS), SOLID.distance(POINTS))
+    np.testing.assert_array_equal(sh.read(tmp_path / "ball.npz").distance(POINTS), SOLID.distance(POINTS))
     with refused(sh.errors.FileFormatError, file="ball.xyzw"):
         save(SOLID, tmp_path / "ball.xyzw")
 

@@ -237,7 +237,7 @@ def test_stopped_runs_go_on_and_other_runs_are_refused(tmp_path):
 def test_bands_survive_files(tmp_path):
     band = complete(SHAPES["brick"]()).field(resolution=60, band=0.1)
     band.save(tmp_path / "band.npz")
-    again = sh.load_field(tmp_path / "band.npz")
+    again = sh.read_field(tmp_path / "band.npz")
     np.testing.assert_array_equal(again.values, band.values)
     assert again.width == band.width
     points = np.random.default_rng(3).uniform(-1, 1, (100, 3))

@@ -80,7 +80,7 @@ def middles(found):
 
 
 def test_a_slab_is_as_thick_everywhere_up_to_its_edges():
-    found = sh.thickness(box((-1, -1, 0), (1, 1, 0.1)), resolution=16)
+    found = sh.wall_thickness(box((-1, -1, 0), (1, 1, 0.1)), resolution=16)
     across = np.abs(found.mesh.face_area_vectors).argmax(axis=1)
     np.testing.assert_allclose(found.values, np.where(across == 2, 0.1, 2.0), rtol=1e-9)
     assert found.thinnest[0] == pytest.approx(0.1)
@@ -89,9 +89,9 @@ def test_a_slab_is_as_thick_everywhere_up_to_its_edges():
 
 
 def test_balls_converge_to_their_diameter():
-    errors = [np.abs(sh.thickness(samples.sphere(k), resolution=16).values - 2).max() for k in (3, 4)]
+    errors = [np.abs(sh.wall_thickness(samples.sphere(k), resolution=16).values - 2).max() for k in (3, 4)]
     assert errors[0] < 0.02 and errors[1] < 0.3 * errors[0]  # of the second order in the size of faces
-    plate = sh.thickness(box((0, 0, 0), (4, 4, 1)), resolution=8)
+    plate = sh.wall_thickness(box((0, 0, 0), (4, 4, 1)), resolution=8)
     assert repr(plate) == f"Thickness({len(plate.values)} faces, 1 to 4, median 1)"
 
 
@@ -103,7 +103,7 @@ def test_a_tube_has_its_wall_and_a_wedge_tapers():
     quads = [(0, 1), (3, 2), (2, 0), (1, 3)]  # outside, inside, bottom, top
     faces = [np.concatenate([np.column_stack([96 * p + a, 96 * p + b, 96 * q + b]),
                              np.column_stack([96 * p + a, 96 * q + b, 96 * q + a])]) for p, q in quads]  # fmt: skip
-    tube = sh.thickness(sh.TriangleMesh(np.concatenate(rims), np.concatenate(faces)), resolution=32)
+    tube = sh.wall_thickness(sh.TriangleMesh(np.concatenate(rims), np.concatenate(faces)), resolution=32)
     round_ones = np.abs(tube.mesh.face_area_vectors[:, 2]) < 1e-9
     np.testing.assert_allclose(tube.values[round_ones], 0.2, rtol=0.01)  # facets: 1 − cos(π / 96)
     np.testing.assert_allclose(tube.values[~round_ones], 1.0, rtol=1e-9)
@@ -112,7 +112,7 @@ def test_a_tube_has_its_wall_and_a_wedge_tapers():
     corners = np.array([[0, 0, 0], [3, 0, 0], [3, 0, 3 * np.tan(slope)]])
     corners = np.concatenate([corners, corners + np.array([0, 1, 0])])
     faces = [[0, 1, 2], [3, 5, 4], [0, 3, 4], [0, 4, 1], [0, 2, 5], [0, 5, 3], [1, 4, 5], [1, 5, 2]]
-    wedge = sh.thickness(sh.TriangleMesh(corners, faces))
+    wedge = sh.wall_thickness(sh.TriangleMesh(corners, faces))
     places = middles(wedge)
     chosen = (np.abs(places[:, 2]) < 1e-12) & (places[:, 0] < 1)
     assert chosen.sum() > 100
@@ -122,7 +122,7 @@ def test_a_tube_has_its_wall_and_a_wedge_tapers():
 def test_what_touches_a_wall_is_the_nearest_place_of_brute_force():
     """Every face tried for every place; with faces turned and missing, the same but near holes."""
     torus = samples.torus(1.0, 0.4, n_around=48, n_across=24)
-    found = sh.thickness(torus, resolution=8)
+    found = sh.wall_thickness(torus, resolution=8)
     triangles = torus.vertices[torus.faces]
     weights = np.random.default_rng(0).dirichlet(np.ones(3), 30)
     targets = np.einsum("wk,mki->mwi", weights, triangles)
@@ -134,12 +134,12 @@ def test_what_touches_a_wall_is_the_nearest_place_of_brute_force():
         sampled = (away**2).sum(axis=-1) / np.where(ahead > 0, ahead, np.nan)
         assert found.values[k] == pytest.approx(np.nanmin(sampled), rel=0.03)
     broken = samples.with_flipped_faces(samples.without_faces(torus, 0.1), 0.2)
-    assert np.median(np.abs(sh.thickness(broken, resolution=8).values / 0.8 - 1)) < 0.02
+    assert np.median(np.abs(sh.wall_thickness(broken, resolution=8).values / 0.8 - 1)) < 0.02
 
 
 def test_what_has_no_opposite_sides_says_so():
     corners = [[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]  # faces of a tetrahedron are 109° apart
-    found = sh.thickness(sh.TriangleMesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), resolution=1)
+    found = sh.wall_thickness(sh.TriangleMesh(corners, [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]]), resolution=1)
     assert np.isnan(found.values).all() and found.below(1) == 0 and "none opposite" in repr(found)
     for asked in (lambda: found.thinnest, lambda: found.percentiles([50])):
         with refused(sh.errors.SourceError, element="thickness"):
@@ -158,7 +158,7 @@ def test_percents_go_from_0_to_100(percents):
 
 def test_sheets_have_no_thickness():
     with refused(sh.errors.SourceError):
-        sh.thickness(sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+        sh.wall_thickness(sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
 
 
 def test_command(tmp_path, capsys):

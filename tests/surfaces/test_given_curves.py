@@ -91,7 +91,7 @@ def test_elements_are_curves_whatever_is_done_with_them():
             closed, theirs = (sh.close_curves(each, BALL, as_oriented=as_oriented) for each in (given, same))
             np.testing.assert_array_equal(closed[0].barycentric, theirs[0].barycentric)
     for given in (ring, [ring], [[ring, same.reversed()]]):  # those of a group one by one
-        found = sh.curve_orientation(given, BALL)
+        found = sh.orientation(given, BALL)
         assert found.turned.shape == (len(found.curves),) and all(isinstance(each, sh.Curve) for each in found.curves)
 
 

@@ -107,7 +107,7 @@ def test_fields_survive_files(ball, ending, tmp_path):
     values = ball.values.copy()
     values[3] = np.nan
     sh.TetField(ball.mesh, values).save(tmp_path / f"phi{ending}")
-    again = sh.load_field(tmp_path / f"phi{ending}")
+    again = sh.read_field(tmp_path / f"phi{ending}")
     assert isinstance(again, sh.TetField)
     assert np.array_equal(again.values, values, equal_nan=True)
     assert (again.mesh.tets == ball.mesh.tets).all()

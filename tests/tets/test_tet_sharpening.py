@@ -135,7 +135,7 @@ def test_fields_from_files_can_be_sharpened(tmp_path):
     mesh, wall, _ = ell(6)
     plain = sh.SignedHeatSolver(mesh).distance(wall)
     plain.save(tmp_path / "phi.vtu")
-    loaded = sh.load_field(tmp_path / "phi.vtu")
+    loaded = sh.read_field(tmp_path / "phi.vtu")
     assert np.array_equal(sh.sharpen(loaded).values, sh.sharpen(plain).values)
     with refused(sh.errors.SourceError):
         sh.sharpen(loaded, method=sh.methods.Convex())

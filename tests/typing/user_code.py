@@ -82,7 +82,7 @@ assert_type(sh.close_curves([curve, curve], mesh), list[sh.Curve])
 assert_type(sh.io.read_curves("curves.json", mesh), list[sh.Curve | sh.SurfacePoints])
 
 # --- unions where it truly is one
-field = sh.load_field("phi.npz")
+field = sh.read_field("phi.npz")
 assert_type(field, sh.GridField | sh.VertexField | sh.TetField)
 assert_type(sh.sharpen(field), sh.GridField | sh.VertexField | sh.TetField)
 for surface in (mesh, polygons):

@@ -43,7 +43,7 @@ from ..solids.heat_surfaces import Heat
 from ..solids.kept_faces import given_surface, unjoined
 from ..solids.overlaps import Nesting
 from ..solids.sample_set import NOISE_WIDTHS, Layout
-from ..solids.sampling import sample, training_points
+from ..solids.sampling import sample_distances, training_points
 from ..solids.simplification import simplified
 from ..solids.solid import Solid
 from ..solver import checked
@@ -250,7 +250,7 @@ class Job:
             figures["surfaces"] = surfaces
         if self.samples is not None:
             how = self.samples
-            taken = sample(phi, how.n, near=how.near, widths=how.widths, seed=how.seed)
+            taken = sample_distances(phi, how.n, near=how.near, widths=how.widths, seed=how.seed)
             (taken.normalized() if how.normalize else taken).save(f"{stem}{self._of_samples}", how.layout)
             figures["samples"] = taken.figures
         return figures

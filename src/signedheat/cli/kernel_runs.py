@@ -20,7 +20,7 @@ def solids() -> None:
                                                               0.1), 0.1)  # fmt: skip
     field = sh.signed_distance(broken, sh.Grid.around(broken.bounds, 20))
     field.offset(0.1)
-    sh.sample(field, 20)
+    sh.sample_distances(field, 20)
     fine = sh.Grid.around(ball.bounds, 48)
     sh.signed_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
     points = sh.PointCloud(ball.vertices)

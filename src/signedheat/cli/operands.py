@@ -282,13 +282,13 @@ def field_or_image(path: str) -> Any:
     if ending not in sh.io.FIELD_FORMATS or (ending == ".npz" and holds_solid(path)):
         return None
     if ending not in IMAGES:
-        return sh.load_field(path)
+        return sh.read_field(path)
     try:
         image = sh.io.read_labels(path)
     except FileFormatError:  # it holds a field in the plane, or no field
-        return sh.load_field(path)
+        return sh.read_field(path)
     along = np.array_equal(image.axes, np.diag(image.spacing))
-    return sh.load_field(path) if along and image.labels.dtype.kind == "f" else image
+    return sh.read_field(path) if along and image.labels.dtype.kind == "f" else image
 
 
 def image_of(arguments: Namespace) -> sh.io.LabelImage | None:

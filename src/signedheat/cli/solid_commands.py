@@ -344,7 +344,9 @@ def sample(arguments: Namespace) -> Summary:
     sh.io.ensure_writable(arguments.output, sh.io.SAMPLE_FORMATS, "samples")
     solid = shapes.solid_of(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
-        samples = sh.sample(solid, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed)
+        samples = sh.sample_distances(
+            solid, arguments.samples, near=arguments.near, widths=arguments.widths, seed=arguments.seed
+        )
     (samples.normalized() if arguments.normalize else samples).save(arguments.output, arguments.layout)
     figures = samples.figures
     summary = {"input": arguments.shape, "output": arguments.output, **figures}
@@ -370,7 +372,7 @@ def contour(arguments: Namespace) -> Summary:
     image: sh.io.LabelImage | None = None
     field = shapes.field_or_image(arguments.field)
     if field is None:  # a set of voxels or a field on tets; other files are refused
-        field = (sh.io.read_labels if Path(arguments.field).suffix == ".npy" else sh.load_field)(arguments.field)
+        field = (sh.io.read_labels if Path(arguments.field).suffix == ".npy" else sh.read_field)(arguments.field)
     if isinstance(field, sh.io.LabelImage):
         image = field
         field = shapes.field_of(field)

@@ -173,11 +173,11 @@ def shape_or_field(path: str) -> Any:
     ending = Path(path).suffix.lower()
     if ending in sh.io.VALUE_FORMATS:
         with suppress(FileFormatError):  # a shape without values
-            return sh.load_field(path)
+            return sh.read_field(path)
     shape = sh.read(path)
     if isinstance(shape, sh.TetMesh) and ending in sh.io.TET_FIELD_FORMATS:
         with suppress(FileFormatError):  # tets without values
-            return sh.load_field(path)
+            return sh.read_field(path)
     return shape
 
 
@@ -235,7 +235,7 @@ def deviation(arguments: Namespace) -> Summary:
     unit = shapes.unit_in_use(arguments, arguments.scan, arguments.nominal)
     scan, nominal = (shapes.read_shape(arguments, path) for path in (arguments.scan, arguments.nominal))
     with shapes.prefix_errors(arguments.nominal), ProgressBar(is_quiet(arguments)) as progress:
-        deviations = sh.deviation(scan, nominal, progress)
+        deviations = sh.deviation(scan, nominal, progress=progress)
     low, median, high = deviations.percentiles((1, 50, 99))
     worst = [
         {"deviation": float(deviations.distances[k]), "at": deviations.points[k].tolist()}
@@ -278,7 +278,7 @@ def thickness(arguments: Namespace) -> Summary:
         sh.io.ensure_writable(output, sh.view.THICKNESS_FORMATS, "thickness")
     solid, unit = shapes.solid_of(arguments, arguments.shape), shapes.unit_in_use(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
-        thicknesses = sh.thickness(solid, resolution=arguments.resolution or 64)
+        thicknesses = sh.wall_thickness(solid, resolution=arguments.resolution or 64)
         least, place = thicknesses.thinnest
     low, median, high = thicknesses.percentiles([5.0, 50.0, 95.0]).tolist()
     summary: dict[str, Any] = {"input": arguments.shape, "output": arguments.output, "units": unit}

@@ -258,7 +258,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
         >>> phi = sh.piecewise_distance(ball.level_set(ball.vertices[:, 2]), ball)
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     phi.save(f"{folder}/phi.ply")
-        ...     sh.load_field(f"{folder}/phi.ply").domain.n_faces == ball.n_faces
+        ...     sh.read_field(f"{folder}/phi.ply").domain.n_faces == ball.n_faces
         True
         """
         self.split().save(path)

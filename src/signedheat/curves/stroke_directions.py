@@ -327,7 +327,7 @@ class CurveOrientation(Frozen, ShortRepr):
         >>> import signedheat as sh
         >>> mesh = sh.samples.sphere(2)
         >>> equator = mesh.level_set(mesh.vertices[:, 2])
-        >>> len(sh.curve_orientation(equator, mesh).agreeing(0.5))
+        >>> len(sh.orientation(equator, mesh).agreeing(0.5))
         1
         """
         return [curve for curve, agreement in zip(self.curves, self.agreement, strict=True) if agreement >= least]

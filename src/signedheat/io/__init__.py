@@ -7,20 +7,38 @@ from .field_files import (
     VALUE_FORMATS,
     VERTEX_FIELD_FORMATS,
     ensure_field_writable,
-    load_field,
+    read_field,
     save_field,
 )
 from .files import ensure_writable
 from .scenes import read_step
 from .shape_files import SAMPLE_FORMATS, SHAPE_FORMATS, read, save
-from .solid_arrays import load
 from .tet_files import TET_FIELD_FORMATS
 from .vdb import write_vdb
 from .voxel_files import LabelImage, read_labels, read_volume
 
 __all__ = [
-    "CURVE_FORMATS", "FIELD_FORMATS", "POLYLINE_FORMATS", "SAMPLE_FORMATS", "SHAPE_FORMATS", "TET_FIELD_FORMATS",
-    "VALUE_FORMATS", "VERTEX_FIELD_FORMATS", "LabelImage", "ensure_field_writable", "ensure_writable", "load",
-    "load_field", "read", "read_curves", "read_labels", "read_polylines", "read_step", "read_volume", "save",
-    "save_field", "write_curves", "write_polylines", "write_vdb",
+    "CURVE_FORMATS",
+    "FIELD_FORMATS",
+    "POLYLINE_FORMATS",
+    "SAMPLE_FORMATS",
+    "SHAPE_FORMATS",
+    "TET_FIELD_FORMATS",
+    "VALUE_FORMATS",
+    "VERTEX_FIELD_FORMATS",
+    "LabelImage",
+    "ensure_field_writable",
+    "ensure_writable",
+    "read",
+    "read_curves",
+    "read_field",
+    "read_labels",
+    "read_polylines",
+    "read_step",
+    "read_volume",
+    "save",
+    "save_field",
+    "write_curves",
+    "write_polylines",
+    "write_vdb",
 ]  # fmt: skip

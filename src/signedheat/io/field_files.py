@@ -100,7 +100,7 @@ def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
     ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
 
 
-def load_field(path: PathLike) -> Field:
+def read_field(path: PathLike) -> Field:
     """Read a field exactly as it was written, with values and transform.
 
     Parameters
@@ -127,7 +127,7 @@ def load_field(path: PathLike) -> Field:
     >>> phi = GridField(sh.Grid((0, 0, 0), (0.1, 0.2, 0.3), (2, 3, 4)), np.random.default_rng(0).random((2, 3, 4)))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     save_field(phi, f"{folder}/phi.vti")
-    ...     bool((load_field(f"{folder}/phi.vti").values == phi.values).all())
+    ...     bool((read_field(f"{folder}/phi.vti").values == phi.values).all())
     True
     """
     if extension(path) in TET_FIELD_FORMATS:

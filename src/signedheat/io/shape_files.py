@@ -20,14 +20,14 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..validation import chosen
 from .drawing_files import POLYLINE_FORMATS
-from .field_files import CONVENTION, load_field
+from .field_files import CONVENTION, read_field
 from .files import PathLike, ensure_writable, extension, format_for, reading, replacing
 from .mesh_files import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .numpy_files import write_npz
 from .ply import read_ply, write_ply
 from .point_files import read_e57, read_las, read_pcd, read_xyz, write_xyz
 from .scenes import read_3mf, read_dae, read_glb, step_mesh
-from .solid_arrays import ARCHIVE_VERSION, arrays_of, holds_solid, load
+from .solid_arrays import ARCHIVE_VERSION, arrays_of, holds_solid, read_solid
 from .tet_files import TET_FORMATS, read_tets, store_cells
 from .voxel_files import read_volume
 from .vtk_xml import read_vtp, write_vtp
@@ -36,10 +36,10 @@ from .vtk_xml import read_vtp, write_vtp
 def read_archive(path: PathLike) -> Solid | TriangleMesh:
     """Return the solid in a NumPy archive, or that of the field in it, or the zero level set of a field without one."""
     if holds_solid(path):
-        return load(path)
-    field = load_field(path)
+        return read_solid(path)
+    field = read_field(path)
     if not isinstance(field, GridField) or field.grid.dimension != 3:
-        raise FileFormatError("it has no solid, and no field on a grid in space", remedy="load it by `load_field`")
+        raise FileFormatError("it has no solid, and no field on a grid in space", remedy="load it by `read_field`")
     return field.solid if isinstance(field.solid, Solid) else cast("TriangleMesh", field.offset(0.0))
 
 

@@ -79,7 +79,7 @@ def holds_solid(path: PathLike) -> bool:
     return "solid_version" in names_in_npz(path)
 
 
-def load(path: PathLike) -> Solid:
+def read_solid(path: PathLike) -> Solid:
     """Read a solid that `Solid.save` has written: distances are the same to the last bit.
 
     Parameters
@@ -104,13 +104,13 @@ def load(path: PathLike) -> Solid:
     >>> solid = sh.complete(samples.without_faces(samples.sphere(2), 0.2))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     solid.save(f"{folder}/ball.npz")
-    ...     again = sh.io.load(f"{folder}/ball.npz")
+    ...     again = sh.read(f"{folder}/ball.npz")
     >>> bool(again.distance([[0.1, 0.2, 0.3]]) == solid.distance([[0.1, 0.2, 0.3]]))
     True
     """
     version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
     if version.shape or version.dtype.kind not in "iuf" or not 0 < version < np.inf:
-        raise FileFormatError("it has no solid", remedy="read fields by `load_field`, shapes by `read`", path=path)
+        raise FileFormatError("it has no solid", remedy="read fields by `read_field`, shapes by `read`", path=path)
     if int(version) != ARCHIVE_VERSION:
         remedy = (
             "install a later version of signedheat" if int(version) > ARCHIVE_VERSION else "complete the shape again"

@@ -253,7 +253,7 @@ class Deviation(Frozen):
 
 @within_memory
 def deviation(
-    scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike, progress: Progress | None = None
+    scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike, *, progress: Progress | None = None
 ) -> Deviation:
     """Measure signed deviations of a scan from a nominal part, at the scan's points or vertices.
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Frozen, Ints, ShortRepr
-from ..curves.stroke_directions import curve_orientation
+from ..curves.stroke_directions import CurveOrientation, curve_orientation
 from ..diagnostics import ShapeOriented
 from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
@@ -18,8 +18,9 @@ from ..kinds import SurfaceDomain
 from ..memory import within_memory
 from ..mesh.components import first_members
 from ..surfaces.polygon_mesh import PolygonMesh
-from ..surfaces.surface_curves import CurveOrPoints
+from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import chosen
 from .bounding import Bounding, bounding
 from .chain import Chain
 from .overlaps import Nesting
@@ -103,29 +104,51 @@ class Orientation(Frozen, ShortRepr):
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
+@overload
+def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Orientation: ...
+@overload
+def orientation(
+    shape: CurvesAndPoints | ElementList | Sequence[ElementList], domain: SurfaceDomain | ForeignShape
+) -> CurveOrientation: ...
 @within_memory
-def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Orientation:
-    """Orient a mesh, and say what was turned, merged and left.
+def orientation(
+    shape: Mesh | ForeignShape | CurvesAndPoints | ElementList | Sequence[ElementList],
+    domain: SurfaceDomain | ForeignShape | None = None,
+    *,
+    nested: Nesting = "given",
+) -> Orientation | CurveOrientation:
+    """Orient a mesh, or curves on a surface, and say which faces or curves were flipped, merged and left.
 
     Vertices at one place, to roundoff, count as one, and so do faces on the same corners. What is closed as
     given stays as it is, or turns as a whole to face outwards. Other faces are made to agree across edges of two faces,
     walls between closed cells are left out (`inner_walls`), and Gauss's formula decides which way the resulting pieces
     face and which of them bound nothing (`signedheat.solids.bounding`).
 
-    Takes O(n log n) time.
+    Curves are flipped so that they bound a region together, the one with the shortest boundary where they leave gaps.
+
+    Takes O(n log n) time for meshes.
 
     Parameters
     ----------
-    shape : TriangleMesh or PolygonMesh
-        Any mesh, however broken.
+    shape : TriangleMesh, PolygonMesh or a sequence of Curve and SurfacePoints
+        Any mesh, however broken; or broken curves on a surface.
+    domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
+        The surface that the curves lie on.
     nested : {"given", "cavities", "bodies"}
-        What closed pieces within others are: what they were given as, relative to the piece they lie in; cavities, and
-        bodies within these; or all bodies.
+        Of meshes: what closed parts within others are. What they were given as, relative to the part they lie in;
+        cavities, and bodies within these; or all bodies.
+
+    Returns
+    -------
+    Orientation or CurveOrientation
+        The oriented mesh or curves, and what was done.
 
     Raises
     ------
     GeometryError
-        If the shape is no mesh.
+        If the shape is no mesh, and no domain is given.
+    SourceError
+        If a curve does not fit the domain.
 
     Examples
     --------
@@ -138,6 +161,9 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
     >>> orientation(samples.union(outer, cavity)).nested_bodies
     1
     """
+    if domain is not None:
+        return curve_orientation(cast("CurvesAndPoints", shape), domain)
+    chosen(nested, Nesting, "nested")
     shape = converted(shape)
     if not isinstance(shape, TriangleMesh | PolygonMesh):
         kind = type(shape).__name__
@@ -232,7 +258,7 @@ def orient(
 ) -> Mesh | list[CurveOrPoints]:
     """Turn the faces of a mesh so that neighbours agree and every part points outwards; or curves so that they agree.
 
-    See `orientation` and `curve_orientation`, which also say what was turned.
+    `orientation` also says what was flipped.
 
     Parameters
     ----------
@@ -240,6 +266,11 @@ def orient(
         Any mesh, or the pieces of broken curves.
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
         The surface that the curves lie on.
+
+    Returns
+    -------
+    TriangleMesh, PolygonMesh or list of Curve and SurfacePoints
+        The oriented mesh, on the same vertices; or the oriented curves, in their order.
 
     Raises
     ------

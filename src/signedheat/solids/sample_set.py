@@ -41,8 +41,8 @@ class Samples:
     Examples
     --------
     >>> import numpy as np
-    >>> from signedheat import sample, samples, signed_distance
-    >>> taken = sample(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
+    >>> from signedheat import sample_distances, samples, signed_distance
+    >>> taken = sample_distances(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
     >>> taken
     Samples(1000 points, 800 near the surface, distances from -3.82 to 3.07)
     >>> bool(np.abs(taken.normalized().points).max() < 1.3)
@@ -108,8 +108,8 @@ class Samples:
         --------
         >>> import numpy as np
         >>> import tempfile
-        >>> from signedheat import sample, samples, signed_distance
-        >>> taken = sample(signed_distance(samples.sphere(2), resolution=16), 10)
+        >>> from signedheat import sample_distances, samples, signed_distance
+        >>> taken = sample_distances(signed_distance(samples.sphere(2), resolution=16), 10)
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     taken.save(f"{folder}/ball.npz")
         ...     np.load(f"{folder}/ball.npz")["points"].shape

@@ -24,7 +24,7 @@ BYTES_PER_SAMPLE = 165
 
 
 @within_memory
-def sample(
+def sample_distances(
     shape: GridField | Shapes,
     n: int = 250_000,
     *,
@@ -69,7 +69,7 @@ def sample(
     --------
     >>> from signedheat import samples, signed_distance
     >>> field = signed_distance(samples.without_faces(samples.sphere(3), 0.3), resolution=32)
-    >>> taken = sample(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
+    >>> taken = sample_distances(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
     >>> away = np.abs(taken.distances - (np.linalg.norm(taken.points, axis=1) - 1))
     >>> bool(np.quantile(away, 0.9) < 0.01 and away.max() < 0.1)
     True

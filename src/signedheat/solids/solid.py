@@ -489,7 +489,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> complete(samples.sphere(2)).sample(100, near=0.5)
         Samples(100 points, 50 near the surface, distances from -0.6 to 0.489)
         """
-        return sampling.sample(self, n, near=near, widths=widths, seed=seed)
+        return sampling.sample_distances(self, n, near=near, widths=widths, seed=seed)
 
     @overload
     def __or__(self, other: Solid) -> Solid: ...
@@ -566,7 +566,7 @@ class Solid(Displayed, Represented, Frozen):
     def save(self, path: str | PathLike[str]) -> None:
         """Write the solid to a ``.npz`` file, or its surface to another format.
 
-        `signedheat.io.load` reads a ``.npz`` file, without notes, and does not complete the shape again. Formats of
+        `signedheat.read` reads a ``.npz`` file, without notes, and does not complete the shape again. Formats of
         shapes, such as ``.stl``, hold ``surface(keep_faces=True)``.
 
         Parameters
@@ -587,7 +587,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> from signedheat import complete, io, samples
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     complete(samples.sphere(2)).save(f"{folder}/ball.npz")
-        ...     io.load(f"{folder}/ball.npz").inside([[0.0, 0.0, 0.0]])
+        ...     io.read(f"{folder}/ball.npz").inside([[0.0, 0.0, 0.0]])
         array([ True])
         """
         files.save_solid(self, path)

@@ -87,7 +87,7 @@ class Thickness(Frozen):
     Examples
     --------
     >>> import signedheat as sh
-    >>> walls = sh.thickness(sh.samples.sphere(3))
+    >>> walls = sh.wall_thickness(sh.samples.sphere(3))
     >>> walls.percentiles([0, 50, 100]).round(1).tolist(), walls.below(1.5)
     ([2.0, 2.0, 2.0], 0.0)
     """
@@ -125,7 +125,7 @@ class Thickness(Frozen):
         Examples
         --------
         >>> import signedheat as sh
-        >>> sh.thickness(sh.samples.sphere(2)).below(3.0)
+        >>> sh.wall_thickness(sh.samples.sphere(2)).below(3.0)
         1.0
         """
         areas = self.mesh.face_areas
@@ -152,7 +152,7 @@ class Thickness(Frozen):
         Examples
         --------
         >>> import signedheat as sh
-        >>> sh.thickness(sh.samples.torus(major=1.0, minor=0.4)).percentiles([50]).round(1).tolist()
+        >>> sh.wall_thickness(sh.samples.torus(major=1.0, minor=0.4)).percentiles([50]).round(1).tolist()
         [0.8]
         """
         order = self._from_thin_to_thick
@@ -180,7 +180,7 @@ class Thickness(Frozen):
         >>> import tempfile
         >>> import signedheat as sh
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     sh.thickness(sh.samples.sphere(2)).save(f"{folder}/walls.ply")
+        ...     sh.wall_thickness(sh.samples.sphere(2)).save(f"{folder}/walls.ply")
         """
         pictures.save_thickness(self, path)
 
@@ -191,7 +191,7 @@ class Thickness(Frozen):
         return f"Thickness({len(self.values)} faces, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
-def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
+def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     """Measure the thickness of a solid behind each of its faces.
 
     It is the diameter of the largest ball that touches the face from within and crosses no wall: the thickness of slabs
@@ -221,7 +221,7 @@ def thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     --------
     >>> from signedheat import samples
     >>> plate = samples.union(samples.sphere(3), samples.sphere(3, radius=0.2, center=(3.0, 0.0, 0.0)))
-    >>> least, place = thickness(plate).thinnest
+    >>> least, place = wall_thickness(plate).thinnest
     >>> round(least, 1), round(float(place[0])) in (3, 4)
     (0.4, True)
     """

@@ -258,7 +258,7 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
         >>> phi = VertexField(mesh, np.array([0.0, 1.0, 0.0]))
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     phi.save(f"{folder}/phi.ply")
-        ...     sh.load_field(f"{folder}/phi.ply").values.tolist()
+        ...     sh.read_field(f"{folder}/phi.ply").values.tolist()
         [0.0, 1.0, 0.0]
         """
         files.write_field(self._embedded, path)
