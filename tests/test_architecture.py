@@ -19,6 +19,7 @@ PACKAGE = Path(signedheat.__file__).parent
 FLOORS = [
     {
         "arrays",
+        "calls",
         "compiled",
         "diagnostics",
         "errors",

@@ -134,8 +134,9 @@ def test_piecewise_distance(arguments, keywords, error):
 @pytest.mark.parametrize(
     ("arguments", "keywords", "error"),
     [
-        case("is not a domain", None, RING, error=sh.errors.UnsupportedTypeError),
-        case("not to a Curve", GRID, RING, error=sh.errors.SourceError),
+        case("not on a NoneType", None, RING, error=sh.errors.UnsupportedTypeError),
+        case("not on a Grid", GRID, RING, error=sh.errors.UnsupportedTypeError),
+        case("curves first", RING, BALL, error=sh.errors.UnsupportedTypeError),
         case("no source was given", BALL, [], error=sh.errors.SourceError),
         case("source 0 is a NoneType", BALL, None, error=sh.errors.SourceError),
         case("source 0 is a TriangleMesh", BALL, BALL, error=sh.errors.SourceError),

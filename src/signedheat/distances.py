@@ -10,6 +10,7 @@ from typing import Any, Literal, cast, get_args, overload
 from numpy.typing import ArrayLike
 
 from .area_elements import bounds_around
+from .calls import are_points, public_call
 from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.curve_distance import distance_to_curves
 from .curves.drawings import distance_to_lines
@@ -20,7 +21,6 @@ from .grids.grid import Dimension, Grid, room_around
 from .grids.grid_field import GridField
 from .jobs import Progress, within
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
-from .memory import within_memory
 from .mesh.polylines import FillRule
 from .sharpening import sharpen
 from .solids.completion import Completing, Completion, Lids, completed
@@ -126,7 +126,7 @@ def signed_distance(
     diffusion: float = 1.0,
     progress: Progress | None = None,
 ) -> Field: ...
-@within_memory
+@public_call
 def signed_distance(
     source: Sources | ElementList | Sequence[ElementList],
     domain: Domain | ForeignShape | None = None,
@@ -309,6 +309,7 @@ def grid_around(
 
 def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
     """Choose the function that measures distance to a source on a domain."""
+    _refuse_points(source, domain)
     sources = as_shapes(source)
     if isinstance(domain, Grid):
         _refuse_other_dimension(sources, domain)
@@ -328,6 +329,17 @@ def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
     if isinstance(domain, Grid):
         return distance_to_shapes if domain.dimension == 3 else distance_to_lines
     return distance_to_shapes if isinstance(domain, TetMesh) else distance_to_curves
+
+
+def _refuse_points(source: object, domain: object) -> None:
+    """Raise if the distance of points to a shape is asked for, in either order."""
+    for points, shape in ((source, domain), (domain, source)):
+        if are_points(points) and isinstance(converted(shape), TriangleMesh | PolygonMesh | Solid):
+            raise UnsupportedTypeError(
+                "signed_distance computes a field, not the distance of points",
+                remedy="for points use sh.complete(mesh).distance(points)",
+                element="domain" if points is domain else "source 0",
+            )
 
 
 def _refuse_other_dimension(sources: Sequence[Any], grid: Grid) -> None:

@@ -12,6 +12,7 @@ from typing import Protocol, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .calls import is_pair, like_array, public_call
 from .errors import SourceError, UnsupportedTypeError
 from .exchange import ACCEPTED_SHAPES, ELEMENTS_OF, Elements
 from .surfaces.digital_surface import DigitalSurface
@@ -100,18 +101,7 @@ def package_of(thing: object) -> str | None:
     return next((root for root in roots if root in PACKAGES), None)
 
 
-def is_pair(thing: object) -> bool:
-    """Whether something is a pair of arrays (vertices, faces), and not two sources or two numbers."""
-    if not (isinstance(thing, tuple | list) and len(thing) == 2 and all(_like_array(part) for part in thing)):
-        return False
-    points, faces = thing
-    try:
-        positions = np.asanyarray(points, dtype=np.float64)
-    except (TypeError, ValueError, RuntimeError):
-        return False
-    return positions.ndim == 2 and positions.shape[1] == 3 and _like_ids(faces)
-
-
+@public_call
 def as_shape(thing: Shape | ForeignShape) -> Shape:
     """Convert an object of another package, a pair of arrays, a solid or an image to a shape.
 
@@ -168,7 +158,7 @@ def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | Te
 
 def refuse_arrays(things: Sequence[object]) -> None:
     """Raise if arguments are arrays that were meant as a shape, and say what is wrong with them."""
-    arrays = [np.asarray(thing) for thing in things if _like_array(thing)]
+    arrays = [np.asarray(thing) for thing in things if like_array(thing)]
     if not arrays or len(arrays) < len(things) or any(array.dtype.kind not in "biuf" for array in arrays):
         return
     if len(arrays) != 2 or any(array.ndim != 2 for array in arrays):
@@ -195,24 +185,6 @@ def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
         several = False
     listed = list(cast("Sequence[Thing]", things)) if several else [things]
     return [converted(cast("Thing", thing)) for thing in listed]
-
-
-def _like_array(part: object) -> bool:
-    return isinstance(part, list | tuple) or hasattr(part, "__array__")
-
-
-def _like_ids(faces: object) -> bool:
-    """Whether something is rows of whole numbers, of equal length or not."""
-    rows = faces if hasattr(faces, "__array__") else list(cast("Sequence[object]", faces))
-    if isinstance(rows, list):
-        return bool(rows) and all(
-            isinstance(row, list | tuple | np.ndarray) and _whole(np.asarray(row), 1) for row in rows
-        )
-    return _whole(np.asarray(rows), 2)
-
-
-def _whole(ids: NDArray[np.generic], axes: int) -> bool:
-    return ids.ndim == axes and bool(np.issubdtype(ids.dtype, np.integer))
 
 
 def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = MappingProxyType({})) -> Elements:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from .area_elements import bounds_around
 from .arrays import Floats
+from .calls import public_call
 from .distances import signed_distance
 from .errors import (
     GeometryError,
@@ -33,7 +34,6 @@ from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .jobs import Progress
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
-from .memory import within_memory
 from .mesh.triangles import part_volumes
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
@@ -106,7 +106,7 @@ class _Morphology(Protocol):
 
 
 def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
-    return cast("_Morphology", within_memory(function))
+    return cast("_Morphology", public_call(function))
 
 
 @_by_kind_of_shape
@@ -222,7 +222,7 @@ def closing(
     return _offsets(shape, distance, (1, -1), domain, resolution, measure)
 
 
-@within_memory
+@public_call
 def offset(
     shape: Shapes,
     distance: float | ArrayLike | Reach,
@@ -291,7 +291,7 @@ def offset(
     return sharp_surface(Offset(solid, reach, MITRE_LIMITS[corners]), grid, progress)
 
 
-@within_memory
+@public_call
 def shell(
     shape: Shapes,
     inner: float,
@@ -383,7 +383,7 @@ def shell(
     return wall if hole is None else _drained(wall, hole, float(grid.spacing.max()))
 
 
-@within_memory
+@public_call
 def thicken(
     sheet: TriangleMesh | PolygonMesh | Sequence[TriangleMesh | PolygonMesh],
     above: float,

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TypeVar, overload
 
+from .calls import public_call
 from .field_kinds import Field
 from .grids import redistancing  # noqa: F401  registers how its fields are sharpened
 from .grids.grid import Dimension
 from .grids.grid_field import GridField
 from .jobs import Progress
 from .kinds import Shapes
-from .memory import within_memory
 from .sharpening_methods import Method, sharpen_field
 from .surfaces import surface_sharpening  # noqa: F401  registers how its fields are sharpened
 from .surfaces.surface_curves import CurvesAndPoints
@@ -37,7 +37,7 @@ def sharpen(
 ) -> TetField: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
-@within_memory
+@public_call
 def sharpen(
     field: Field,
     source: CurvesAndPoints | Shapes | None = None,

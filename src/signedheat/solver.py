@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import Any, Generic, Literal, NamedTuple, TypeVar, overload
 
 from .arrays import Frozen, Ints
+from .calls import public_call, refuse_pair_apart, refuse_uncallable
 from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
@@ -19,7 +20,6 @@ from .grids.grid import Dimension, Grid
 from .grids.grid_field import GridField
 from .jobs import Progress, Stopwatch, within
 from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
-from .memory import within_memory
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .surfaces.intrinsic_discretization import Retriangulated, checked_intrinsic, lowered_by_angles
@@ -96,7 +96,11 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     intrinsic: bool | Literal["auto"] = "auto"
 
     def __post_init__(self) -> None:
+        refuse_pair_apart((self.domain, self.diffusion), "SignedHeatSolver")
+        refuse_uncallable(self.progress)
         object.__setattr__(self, "domain", converted(self.domain))
+        if discretize.dispatch(type(self.domain)) is discretize.dispatch(object):
+            discretize(self.domain)  # raises
         if not isinstance(self.diffusion, Extrapolated | None):
             object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
         checked_intrinsic(self.intrinsic)
@@ -147,7 +151,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ) -> VertexField[AnySurface]: ...
     @overload
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field: ...
-    @within_memory
+    @public_call
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field:
         """Compute the signed distance to sources.
 
@@ -227,7 +231,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ) -> list[VertexField[AnySurface]]: ...
     @overload
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
-    @within_memory
+    @public_call
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]:
         """Compute the signed distance to each of several sources, faster than by one call of `distance` for each.
 

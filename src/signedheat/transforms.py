@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .arrays import Floats, Ints
+from .calls import public_call
 from .errors import GeometryError, SourceError, UnsupportedTypeError
 from .foreign import ForeignShape, Represented, SurfaceShape, as_shape, as_shapes, converted, refuse_arrays
 from .grids.polyline import Polyline
@@ -23,6 +24,7 @@ from .tets.tet_mesh import TetMesh
 from .validation import LARGEST_COORDINATE, SMALLEST_EXTENT, numbers
 
 
+@public_call
 def transform(
     shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh | ForeignShape, matrix: ArrayLike
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:

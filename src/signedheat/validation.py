@@ -87,7 +87,8 @@ def finite_rows(
     array = numbers(values, name, error)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
-        raise error(f"{name} must have shape {wanted}, not {array.shape}", element=name)
+        remedy = f"pass {name}.T" if columns is not None and array.ndim == 2 and array.shape[0] == columns else None
+        raise error(f"{name} must have shape {wanted}, not {array.shape}", remedy=remedy, element=name)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         raise error(
@@ -251,9 +252,17 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
     if array.size == 0:
         raise GeometryError(f"there are no {name}: the shape is empty", element=name)
     if array.ndim != 2 or array.shape[1] != corners:
-        raise GeometryError(f"{name} must have shape (m, {corners}), not {array.shape}", element=name)
+        raise GeometryError(
+            f"{name} must have shape (m, {corners}), not {array.shape}",
+            remedy=_other_layout(array, name, corners),
+            element=name,
+        )
     if array.dtype.kind not in "iuO":
-        raise GeometryError(f"{name} must hold integer vertex ids, not {array.dtype}", element=name)
+        raise GeometryError(
+            f"{name} must hold integer vertex ids, not {array.dtype}",
+            remedy=f"pass {name}.astype(int)" if _whole(array) else f"pass the vertices first, then the {name}",
+            element=name,
+        )
     ids = whole_numbers(array, name)
     outside = np.flatnonzero(((ids < 0) | (ids >= n_vertices)).any(axis=1))
     if len(outside):
@@ -261,9 +270,33 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
         raise GeometryError(
             f"{len(outside)} {name} name a vertex that does not exist; number {first} is "
             f"{ids[first].tolist()}, but vertex ids go from 0 to {n_vertices - 1}",
+            remedy=from_zero(ids, n_vertices, name),
             element=f"number {first}",
         )
     return frozen(ids)
+
+
+def _whole(array: NDArray[Any]) -> bool:
+    """Whether an array has whole numbers only, of any type."""
+    return array.dtype.kind == "f" and bool((array == np.round(array)).all())
+
+
+def from_zero(ids: Ints, n_vertices: int, name: str) -> str | None:
+    """Say how to count vertices from 0, if the ids look as if they were counted from 1."""
+    return f"they are counted from 1, so pass {name} - 1" if ids.min() == 1 and ids.max() == n_vertices else None
+
+
+def _other_layout(array: NDArray[Any], name: str, corners: int) -> str | None:
+    """Say how to bring faces or tets into our layout, if they are in one that others use."""
+    if array.ndim == 2 and array.shape[1] == corners + 1 and (array[:, 0] == corners).all():
+        return f"pass {name}[:, 1:], without the numbers of corners"
+    if array.ndim == 1 and len(array) % (corners + 1) == 0 and (array[:: corners + 1] == corners).all():
+        return f"pass {name}.reshape(-1, {corners + 1})[:, 1:], without the numbers of corners"
+    if array.ndim == 2 and array.shape[0] == corners:
+        return f"pass {name}.T"
+    if array.ndim == 2 and array.shape[1] > corners == 3:
+        return "pass quads and other polygons to sh.PolygonMesh(vertices, polygons)"
+    return None
 
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:

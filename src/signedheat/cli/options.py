@@ -37,11 +37,42 @@ CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGH
 """Names of the constraints except levels, as they are given and listed in errors."""
 
 
+COMMANDS_OF_OTHERS = {
+    "boolean": "union, intersect or subtract",
+    "check": "info",
+    "clean": "watertight",
+    "compare": "deviation",
+    "difference": "subtract",
+    "dilate": "morph",
+    "distance": "volume",
+    "erode": "morph",
+    "fill-holes": "fill",
+    "fill_holes": "fill",
+    "fix": "watertight",
+    "heal": "watertight",
+    "hollow": "morph",
+    "intersection": "intersect",
+    "isosurface": "contour",
+    "manifold": "watertight",
+    "plot": "view",
+    "repair": "watertight",
+    "sdf": "volume",
+    "shell": "morph",
+    "show": "view",
+    "thicken": "morph",
+    "voxelize": "volume",
+}
+"""Commands of ours, by the names that other programs have for them."""
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser with one-line errors."""
 
     def error(self, message: str) -> NoReturn:
         """Print an error in one line, and exit with status 2."""
+        unknown = re.search(r"COMMAND: invalid choice: '([^']*)'", message)
+        if unknown and unknown[1] in COMMANDS_OF_OTHERS:
+            message = f"there is no command '{unknown[1]}': use {COMMANDS_OF_OTHERS[unknown[1]]}"
         say(f"{self.prog}: {message} (see {self.prog} --help)")
         raise SystemExit(2)
 

@@ -10,13 +10,13 @@ import numpy as np
 import scipy
 
 from ..arrays import Floats, Ints, mask_of
+from ..calls import public_call
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
-from ..errors import SourceError
+from ..errors import SourceError, UnsupportedTypeError
 from ..foreign import ForeignShape, as_list, converted
 from ..jobs import Progress
 from ..kinds import SurfaceDomain
-from ..memory import within_memory
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..solver import SignedHeatSolver, distance_unwarned
@@ -35,7 +35,7 @@ LEAST_LOOP = 0.5
 the wrong sign inside them."""
 
 
-@within_memory
+@public_call
 def close_curves(
     curves: CurvesAndPoints | ElementList | Sequence[ElementList],
     domain: SurfaceDomain | ForeignShape,
@@ -94,7 +94,13 @@ def close_curves(
     >>> whole
     [Curve(21 points, open, oriented)]
     """
-    surface = cast("SurfaceDomain", converted(domain))
+    surface = converted(domain)
+    if not isinstance(surface, SurfaceDomain):
+        raise UnsupportedTypeError(
+            f"curves are completed on a surface, not on a {type(domain).__name__}",
+            remedy="pass the curves first, then the surface",
+            element="domain",
+        )
     listed = as_curves(surface, as_list(curves))
     refuse_without_sides(listed)
     return completion(surface, listed, constraint, diffusion, None, as_oriented, every_piece)[1]

@@ -16,12 +16,13 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Bools, Complexes, Floats
+from ..calls import public_call
 from ..diagnostics import Diagnostics, Jumps
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..foreign import ForeignShape, as_list, converted
 from ..jobs import Progress, Stopwatch, within
 from ..linear import chosen_backend
-from ..memory import refuse_beyond_memory, within_memory
+from ..memory import refuse_beyond_memory
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
@@ -46,7 +47,7 @@ BYTES_WITH_JUMPS = {"pardiso": (2600, 0), "superlu": (525, 182)}
 """Measured peak memory per triangle, and what each doubling of their number adds, by back end."""
 
 
-@within_memory
+@public_call
 def piecewise_distance(
     sources: CurvesAndPoints,
     domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation | ForeignShape,
@@ -123,6 +124,7 @@ def piecewise_distance(
         raise UnsupportedTypeError(
             "piecewise distance needs a TriangleMesh, a PolygonMesh or an IntrinsicTriangulation, not a "
             f"{type(domain).__name__}",
+            remedy="pass the curves first, then the surface",
             element="domain",
         )
     smooth, intrinsic = flag(smooth, "smooth"), checked_intrinsic(intrinsic)

@@ -14,12 +14,12 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Frozen
+from ..calls import public_call
 from ..diagnostics import Diagnostics
 from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
 from ..exchange import Displayed, with_values
 from ..field_arithmetic import Combinable, HasFields, Rule
 from ..field_levels import on_level, refuse_beyond_walls
-from ..memory import within_memory
 from ..mesh.triangles import flipped_along_creases
 from ..packages import lazy_module
 from ..parallel import in_chunks
@@ -243,7 +243,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def contour(self: GridField[Literal[2]], level: float = 0.0) -> list[Polyline]: ...
     @overload
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
-    @within_memory
+    @public_call
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline]:
         """Extract the level set φ = level.
 

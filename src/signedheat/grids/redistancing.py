@@ -19,11 +19,11 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Ints
+from ..calls import public_call
 from ..compiled import compiled
 from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..jobs import Progress, run_cancellable
-from ..memory import within_memory
 from ..packages import lazy_module
 from ..parallel import in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
@@ -37,7 +37,7 @@ from .solid_queries import Scaled
 from .stencil import padded_shape
 
 
-@within_memory
+@public_call
 def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False) -> Floats:
     """Compute the signed distance of the nodes of a grid to the zero set of an array of values, or of signs.
 

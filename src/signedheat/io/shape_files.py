@@ -7,6 +7,7 @@ from typing import cast
 
 import numpy as np
 
+from ..calls import public_call
 from ..errors import FileFormatError
 from ..exchange import Elements
 from ..foreign import ForeignShape, as_shape, elements, shape_of
@@ -22,6 +23,7 @@ from ..validation import chosen
 from .drawing_files import POLYLINE_FORMATS
 from .field_files import CONVENTION, read_field
 from .files import PathLike, ensure_writable, extension, format_for, reading, replacing
+from .image_files import NIFTI
 from .mesh_files import read_obj, read_off, read_stl, write_obj, write_off, write_pc, write_stl
 from .numpy_files import write_npz
 from .ply import read_ply, write_ply
@@ -128,6 +130,12 @@ def read(path: PathLike) -> Shape | Solid:
             "`signed_distance`",
             path=path,
         )
+    if extension(path) in NIFTI:
+        raise FileFormatError(
+            "an image is no shape by itself",
+            remedy="read its labels by `sh.io.read_labels`, or a field of distances by `sh.read_field`",
+            path=path,
+        )
     read_shape = format_for(path, READERS, "a shape")
     with reading(path):
         found = read_shape(path)
@@ -143,6 +151,7 @@ def read(path: PathLike) -> Shape | Solid:
         return shape
 
 
+@public_call
 def save(shape: Shape | ForeignShape, path: PathLike) -> None:
     """Write a shape, in the format given by the extension.
 

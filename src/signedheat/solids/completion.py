@@ -14,6 +14,7 @@ import numpy as np
 import scipy
 
 from ..arrays import Floats, Ints
+from ..calls import public_call
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note
 from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
@@ -21,7 +22,7 @@ from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
 from ..linear.threads import one_blas_thread
-from ..memory import refuse_beyond_memory, within_memory
+from ..memory import refuse_beyond_memory
 from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
@@ -115,7 +116,7 @@ class Completion:
             flag(getattr(self, name), name)
 
 
-@within_memory
+@public_call
 def complete(
     shape: ShapeLike | Sequence[ShapeLike],
     *,

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
+from ..calls import public_call
 from ..errors import SourceError
 from ..foreign import SurfaceShape, as_shape, what_to_pass
 from ..jobs import Progress
 from ..kinds import ShapeLike
-from ..memory import within_memory
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
 from ..search.face_tree import EQUALLY_NEAR, FaceFeatures, FaceTree, NearestFaces
@@ -251,7 +251,7 @@ class Deviation(Frozen):
         return f"Deviation({len(self.of_surface)} points, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
-@within_memory
+@public_call
 def deviation(
     scan: ShapeLike | NDArray[np.floating], nominal: ShapeLike, *, progress: Progress | None = None
 ) -> Deviation:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Ints
+from ..calls import public_call
 from ..errors import GeometryError, SourceError
 from ..foreign import ForeignShape, converted
-from ..memory import within_memory
 from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.triangles import side_lengths
@@ -70,7 +70,7 @@ def fill_holes(
     rims: ArrayLike | None = None,
     lids: Lids = "bent",
 ) -> FilledMesh: ...
-@within_memory
+@public_call
 def fill_holes(
     mesh: TriangleMesh | PolygonMesh | ForeignShape,
     *,

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats
+from ..calls import public_call
 from ..errors import GeometryError, OutsideError, SignedHeatError
 from ..field_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
-from ..memory import within_memory
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import array_of, finite_number, flag, positive_steps, refuse_beside, whole_number
@@ -124,7 +124,7 @@ class NodePlanes:
         return mixed, mean
 
 
-@within_memory
+@public_call
 def contour(
     f: Function | ArrayLike,
     bounds: ArrayLike,

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Frozen, Ints, ShortRepr
+from ..calls import public_call
 from ..curves.stroke_directions import CurveOrientation, curve_orientation
 from ..diagnostics import ShapeOriented
 from ..errors import GeometryError
 from ..foreign import ForeignShape, converted
 from ..kinds import SurfaceDomain
-from ..memory import within_memory
 from ..mesh.components import first_members
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints, ElementList
@@ -110,7 +110,7 @@ def orientation(shape: Mesh | ForeignShape, *, nested: Nesting = "given") -> Ori
 def orientation(
     shape: CurvesAndPoints | ElementList | Sequence[ElementList], domain: SurfaceDomain | ForeignShape
 ) -> CurveOrientation: ...
-@within_memory
+@public_call
 def orientation(
     shape: Mesh | ForeignShape | CurvesAndPoints | ElementList | Sequence[ElementList],
     domain: SurfaceDomain | ForeignShape | None = None,
@@ -252,7 +252,7 @@ def _turned_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
 def orient(shape: Mesh | ForeignShape) -> Mesh: ...
 @overload
 def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape) -> list[CurveOrPoints]: ...
-@within_memory
+@public_call
 def orient(
     shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
+from ..calls import public_call
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..grids.grid_field import GridField
 from ..kinds import Shapes
-from ..memory import refuse_beyond_memory, within_memory
+from ..memory import refuse_beyond_memory
 from ..mesh.triangles import bent_edges, face_areas
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -23,7 +24,7 @@ BYTES_PER_SAMPLE = 165
 """Peak memory per sample, including the search for its nearest face."""
 
 
-@within_memory
+@public_call
 def sample_distances(
     shape: GridField | Shapes,
     n: int = 250_000,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints, short
+from ..calls import public_call
 from ..diagnostics import CompletedArea, Diagnostics, Note
 from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
 from ..exchange import Displayed
@@ -20,7 +21,6 @@ from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
 from ..grids.solid_queries import Closest
 from ..jobs import Progress
-from ..memory import within_memory
 from ..mesh.box_tree import order_in_space
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.welding import indexed
@@ -156,7 +156,7 @@ class Solid(Displayed, Represented, Frozen):
         """All faces, including the completion and sheets, as one mesh."""
         return _mesh(self.triangles)
 
-    @within_memory
+    @public_call
     def distance(self, points: ArrayLike, *, signed: bool = True) -> Floats:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
@@ -200,7 +200,7 @@ class Solid(Displayed, Represented, Frozen):
             (result[order],) = in_chunks(measured, places[order])
         return shaped(result, shape)
 
-    @within_memory
+    @public_call
     def inside(self, points: ArrayLike) -> Bools:
         """Find which points are inside.
 
@@ -223,7 +223,7 @@ class Solid(Displayed, Represented, Frozen):
         places, shape = query_points(points, 3)
         return shaped(self.windings.inside(places), shape)
 
-    @within_memory
+    @public_call
     def closest(self, points: ArrayLike) -> Closest:
         """Find the nearest place of the surface for each point.
 
@@ -255,7 +255,7 @@ class Solid(Displayed, Represented, Frozen):
         back[order] = np.arange(len(order))
         return Closest(*(shaped(values[back], shape) for values in in_chunks(self._closest, places[order])))
 
-    @within_memory
+    @public_call
     def field(
         self,
         resolution: int | None = None,
@@ -328,7 +328,7 @@ class Solid(Displayed, Represented, Frozen):
             raise SourceError("only bands are stored tile by tile", remedy="give a band, or save the field")
         return dense_field(self, where, progress)
 
-    @within_memory
+    @public_call
     def surface(
         self,
         level: float = 0.0,

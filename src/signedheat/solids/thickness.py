@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Frozen, Ints
+from ..calls import public_call
 from ..compiled import compiled
 from ..errors import SourceError
 from ..kinds import ShapeLike
@@ -191,6 +192,7 @@ class Thickness(Frozen):
         return f"Thickness({len(self.values)} faces, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
+@public_call
 def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     """Measure the thickness of a solid behind each of its faces.
 

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Frozen, Ints
+from ..calls import public_call
 from ..errors import GeometryError
 from ..exchange import Displayed
 from ..foreign import ForeignShape, converted
 from ..jobs import Progress, Stopwatch, within
-from ..memory import within_memory
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import N_STEPS, flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -363,7 +363,7 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
 
 
-@within_memory
+@public_call
 def intrinsic_delaunay(
     mesh: TriangleMesh | ForeignShape,
     keep: CurvesAndPoints | ElementList | Sequence[ElementList] = (),

@@ -22,7 +22,7 @@ from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.triangles import area_vectors, cut_into_ears
-from ..validation import array_of, coordinates, frozen, used_bounds, whole_numbers
+from ..validation import array_of, coordinates, from_zero, frozen, used_bounds, whole_numbers
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 
@@ -86,6 +86,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
             first = int(np.searchsorted(offsets, outside[0], side="right") - 1)
             raise GeometryError(
                 f"polygon {first} names vertex {corners[outside[0]]}, but vertex ids go from 0 to {len(positions) - 1}",
+                remedy=from_zero(corners, len(positions), "polygons"),
                 element=f"polygon {first}",
             )
         vars(self).update(vertices=positions, corners=frozen(corners), offsets=frozen(offsets))

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..arrays import Floats, Ints
+from ..calls import public_call
 from ..errors import GeometryError
-from ..memory import within_memory
 from ..mesh.components import first_members
 from ..mesh.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
 from .intrinsic_history import misplaced_lines
@@ -21,7 +21,7 @@ from .intrinsic_triangulation import IntrinsicTriangulation
 from .polygon_mesh import PolygonMesh
 
 
-@within_memory
+@public_call
 def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMesh, csr_matrix]:
     """Subdivide the triangles of an intrinsic triangulation along the edges of its mesh.
 

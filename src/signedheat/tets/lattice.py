@@ -20,11 +20,12 @@ import scipy
 
 from ..area_elements import area_elements, bounds_around
 from ..arrays import Bools, Floats, Ints
+from ..calls import public_call
 from ..errors import GeometryError, MemoryLimitError
 from ..foreign import converted
 from ..grids.grid import room_around
 from ..kinds import Shape, ShapeLike
-from ..memory import refuse_beyond_memory, within_memory
+from ..memory import refuse_beyond_memory
 from ..mesh.components import places_among
 from ..surfaces.point_cloud import PointCloud
 from ..validation import finite_number, refuse_extreme
@@ -38,7 +39,7 @@ BYTES_PER_LATTICE_TET = 350
 """Measured peak memory of meshing; distance takes more."""
 
 
-@within_memory
+@public_call
 def tetrahedralize(
     shape: ShapeLike, *, resolution: int = 32, padding: float | None = None, grading: float = 3.0
 ) -> TetMesh:
