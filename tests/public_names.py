@@ -15,6 +15,7 @@ MODULES = {
     "methods": None,
     "morphology": None,
     "results": None,
+    "torch": None,
 }
 
 PUBLIC = [(name, getattr(sh, name)) for name in sh.__all__]

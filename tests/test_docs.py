@@ -102,10 +102,32 @@ def test_docstrings_hold_no_substitutions(thing):
     assert not re.search(r"\|[^\s|][^|\n]*[^\s|]\||\|[^\s|]\|", text)
 
 
+CALLABLE = [(name, thing) for name, thing in PUBLIC if inspect.isroutine(thing)]
+KNOWN = {name for name, _ in [*PUBLIC, *methods()]}
+
+
+@pytest.mark.parametrize(("name", "thing"), PUBLIC, ids=[name for name, _ in PUBLIC])
+def test_docstrings_say_what_else_to_look_at(name, thing):
+    found = re.search(r"^See Also\n-+\n(.*?)(?:\n\n|\Z)", inspect.getdoc(thing) or "", re.M | re.S)
+    assert found, f"{name} has no section See Also"
+    targets = [line.partition(" : ")[0] for line in found[1].splitlines()]
+    assert targets and set(targets) <= KNOWN - {name}
+
+
+@pytest.mark.parametrize(("name", "function"), CALLABLE, ids=[name for name, _ in CALLABLE])
+def test_functions_say_what_they_take_and_return(name, function):
+    says_what_it_takes_and_returns(name, function)
+
+
 @pytest.mark.parametrize(("name", "method"), methods(), ids=[name for name, _ in methods()])
 def test_methods_say_what_they_take_and_return(name, method):
-    """With an example; `make docs` checks that each has an anchor."""
-    text, signature = inspect.getdoc(method) or "", inspect.signature(method)
+    """`make docs` checks that each has an anchor."""
+    says_what_it_takes_and_returns(name, method)
+
+
+def says_what_it_takes_and_returns(name, function):
+    """Assert that a docstring describes each parameter and the result, with an example."""
+    text, signature = inspect.getdoc(function) or "", inspect.signature(function)
     sections = re.findall(r"^(\w+)\n-+$", text, re.M)
     parameters = [parameter for parameter in signature.parameters if parameter != "self"]
     described = re.findall(r"^\*{0,2}(\w[^:\n]*?) : ", text, re.M) + re.findall(r"^\*(\w+) : ", text, re.M)

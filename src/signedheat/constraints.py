@@ -18,7 +18,13 @@ __all__ = ["Constraint", "EachComponent", "Free", "LevelValues", "Soft", "ZeroSe
 
 @runtime_checkable
 class Constraint(Protocol):
-    """Protocol of constraints, which finish step 3."""
+    """Protocol of constraints, which finish step 3.
+
+    See Also
+    --------
+    constraints.ZeroSet : Zero on the source.
+    SignedHeatSolver : The signed heat method alone.
+    """
 
     def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
         """Solve step 3 for φ under the constraint.
@@ -50,6 +56,11 @@ class Constraint(Protocol):
 class Free(Constraint):
     """No constraint: φ solves Eq. 13 and is shifted so that its weighted mean over the source is zero.
 
+    See Also
+    --------
+    constraints.ZeroSet : Zero on the source.
+    constraints.Soft : A penalty on the source.
+
     Examples
     --------
     >>> Free()
@@ -72,6 +83,12 @@ class ZeroSet(Constraint):
         there would be constant around the curve. On grids a smooth function, and on tets springs, correct φ to about
         zero along the source, which is cheaper and, on broken input, more accurate.
 
+    See Also
+    --------
+    constraints.Free : No constraint.
+    constraints.EachComponent : Constant on each component.
+    constraints.Soft : A penalty on the source.
+
     Examples
     --------
     >>> ZeroSet(hard=True)
@@ -93,6 +110,11 @@ class EachComponent(Constraint):
     ----------
     hard : bool
         Impose the levels at every sample; by default, they are imposed as exactly as by `ZeroSet`.
+
+    See Also
+    --------
+    constraints.ZeroSet : Zero on the source.
+    constraints.LevelValues : Given levels.
 
     Examples
     --------
@@ -124,6 +146,11 @@ class LevelValues(ShortRepr, Constraint):
     ConstraintError
         If a value is not finite, or beyond 1e40; or, when solving, if the number of values is neither that of the
         sources nor that of the components.
+
+    See Also
+    --------
+    constraints.EachComponent : Constant on each component.
+    constraints.ZeroSet : Zero on the source.
 
     Examples
     --------
@@ -172,6 +199,11 @@ class Soft(Constraint):
     ------
     ConstraintError
         If the weight is not positive and finite.
+
+    See Also
+    --------
+    constraints.Free : No constraint.
+    constraints.ZeroSet : Zero on the source.
 
     Examples
     --------

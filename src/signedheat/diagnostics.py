@@ -63,6 +63,11 @@ class Diagnostics(ShortRepr):
     notes : tuple of Note
         Residuals, repairs, subdivisions, dropped parts of sources; `note` finds one by its type.
 
+    See Also
+    --------
+    complete : Make a solid of a broken shape.
+    signed_distance : Distance on a grid, on tets or along a surface.
+
     Examples
     --------
     >>> diagnostics = Diagnostics().noting(TetsTurned(3), SlopeErrors(0.2, 0.1))

@@ -210,6 +210,14 @@ def signed_distance(
     UnsupportedTypeError
         If an option does not apply to this kind of source, or to a domain that is given.
 
+    See Also
+    --------
+    complete : Make a solid of a broken shape.
+    Solid.distance : Exact distance of points.
+    SignedHeatSolver : The signed heat method alone.
+    piecewise_distance : Distance to curves that bound no region.
+    redistance : Distance from an array of values or signs.
+
     Examples
     --------
     Two overlapping balls, which are united:

@@ -39,6 +39,12 @@ class SignedHeatError(ValueError):
     path : str, optional
         The file concerned.
 
+    See Also
+    --------
+    errors.GeometryError : An invalid shape.
+    errors.SourceError : A source that cannot be used.
+    errors.FileFormatError : A file that cannot be read or written.
+
     Examples
     --------
     >>> error = GeometryError("polygon 3 has 2 corners", remedy="remove it", element="polygon 3")
@@ -91,51 +97,117 @@ AnyError = TypeVar("AnyError", bound=SignedHeatError)
 
 
 class GeometryError(SignedHeatError):
-    """An invalid shape or domain: no elements, NaN coordinates, ids out of range, zero area."""
+    """An invalid shape or domain: no elements, NaN coordinates, ids out of range, zero area.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    """
 
 
 class SourceError(SignedHeatError):
-    """A source that cannot be used on this domain: off the domain, empty, without normals."""
+    """A source that cannot be used on this domain: off the domain, empty, without normals.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    errors.CancellingNormalsError : A source whose normals cancel.
+    """
 
 
 class CancellingNormalsError(SourceError):
-    """A source whose normals cancel each other everywhere: doubled walls, loops inside single faces."""
+    """A source whose normals cancel each other everywhere: doubled walls, loops inside single faces.
+
+    See Also
+    --------
+    errors.SourceError : A source that cannot be used.
+    orient : Flip faces or curves so that they agree.
+    """
 
 
 class ConstraintError(SignedHeatError):
-    """A constraint that does not fit the sources, for instance the wrong number of level values."""
+    """A constraint that does not fit the sources, for instance the wrong number of level values.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    constraints.ZeroSet : Zero on the source.
+    """
 
 
 class OutsideError(SignedHeatError):
-    """A level or a point outside the range or the domain of a field."""
+    """A level or a point outside the range or the domain of a field.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    """
 
 
 class MemoryLimitError(SignedHeatError):
-    """A problem that does not fit in memory, or a result that does not fit on disk; found in advance where possible."""
+    """A problem that does not fit in memory, or a result that does not fit on disk; found in advance where possible.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    """
 
 
 class FactorizationError(SignedHeatError):
-    """A matrix that cannot be factorised: not positive definite, or its factor does not fit in memory."""
+    """A matrix that cannot be factorised: not positive definite, or its factor does not fit in memory.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    """
 
 
 class FileFormatError(SignedHeatError):
-    """A file that cannot be read or written: missing, truncated, of unknown format, not writable."""
+    """A file that cannot be read or written: missing, truncated, of unknown format, not writable.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    read : Read a shape or a solid.
+    """
 
 
 class UnsupportedTypeError(SignedHeatError, TypeError):
-    """An argument of an unsupported type, such as an object that is not a domain, a constraint or a field."""
+    """An argument of an unsupported type, such as an object that is not a domain, a constraint or a field.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    as_shape : Convert objects of other packages.
+    """
 
 
 class MissingPackageError(SignedHeatError, ImportError):
-    """An optional package that a format or function needs is not installed."""
+    """An optional package that a format or function needs is not installed.
+
+    See Also
+    --------
+    SignedHeatError : The base class of all errors.
+    """
 
 
 class UnreachedWarning(UserWarning):
-    """A connected component of the domain has no source; the distance there is NaN."""
+    """A connected component of the domain has no source; the distance there is NaN.
+
+    See Also
+    --------
+    errors.InexactWarning : Less exact than promised.
+    """
 
 
 class InexactWarning(UserWarning):
-    """The result misses its stated accuracy; its diagnostics give details."""
+    """The result misses its stated accuracy; its diagnostics give details.
+
+    See Also
+    --------
+    errors.UnreachedWarning : A part without a source.
+    results.Diagnostics : What was done, and how long it took.
+    """
 
 
 def warn_user(message: str, category: type[Warning]) -> None:

@@ -263,6 +263,12 @@ def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
     SignedHeatError
         If the width is negative or not finite.
 
+    See Also
+    --------
+    morphology.smooth_intersection : Intersection with a rounded seam.
+    morphology.smooth_difference : Difference with a rounded seam.
+    GridField : Values on a grid.
+
     Examples
     --------
     >>> import signedheat as sh
@@ -277,6 +283,24 @@ def smooth_union(a: Solid, b: Solid, width: float) -> Solid:
 def smooth_intersection(a: Solid, b: Solid, width: float) -> Solid:
     """Intersect two solids, with a rounded edge where they meet; see `smooth_union`.
 
+    Parameters
+    ----------
+    a, b : GridField, TetField or VertexField
+        On the same domain.
+    width : float
+        Width of the transition, in the units of the domain.
+
+    Returns
+    -------
+    GridField, TetField or VertexField
+        A field whose sign and zero set are those of the blend.
+
+    See Also
+    --------
+    morphology.smooth_union : Union with a rounded seam.
+    morphology.smooth_difference : Difference with a rounded seam.
+    GridField : Values on a grid.
+
     Examples
     --------
     >>> import signedheat as sh
@@ -290,6 +314,24 @@ def smooth_intersection(a: Solid, b: Solid, width: float) -> Solid:
 
 def smooth_difference(a: Solid, b: Solid, width: float) -> Solid:
     """Subtract the second solid from the first, with a rounded edge where they meet; see `smooth_union`.
+
+    Parameters
+    ----------
+    a, b : GridField, TetField or VertexField
+        On the same domain.
+    width : float
+        Width of the transition, in the units of the domain.
+
+    Returns
+    -------
+    GridField, TetField or VertexField
+        A field whose sign and zero set are those of the blend.
+
+    See Also
+    --------
+    morphology.smooth_union : Union with a rounded seam.
+    morphology.smooth_intersection : Intersection with a rounded seam.
+    GridField : Values on a grid.
 
     Examples
     --------

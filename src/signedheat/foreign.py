@@ -126,6 +126,12 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
     GeometryError
         If the shape is invalid.
 
+    See Also
+    --------
+    read : Read a shape or a solid.
+    transform : Move a shape by a matrix.
+    TriangleMesh : Triangles in space.
+
     Examples
     --------
     >>> import signedheat as sh

@@ -150,6 +150,12 @@ def dilate(
     OutsideError
         If the result is empty, or leaves the domain.
 
+    See Also
+    --------
+    morphology.erode : Shrink by a distance.
+    morphology.closing : Grow, then shrink.
+    offset : The closed surface at a distance.
+
     Examples
     --------
     >>> from signedheat import samples
@@ -169,7 +175,31 @@ def erode(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Erode a shape: offset it inward by a distance. Parameters, result and errors are those of `dilate`.
+    """Erode a shape: offset it inward by a distance.
+
+    Parameters
+    ----------
+    shape : shape, curves or polylines
+        As for `dilate`, and so are all errors.
+    distance : float
+        The offset, in the units of the shape; not negative.
+    domain : Grid, TetMesh, TriangleMesh or any other domain, optional
+        Domain of the distance; by default a grid around the shape.
+    resolution : int, optional
+        Number of nodes along the longest side of that grid; 128 by default.
+    measure : callable, optional
+        Called as ``measure(shape, domain)`` in place of `signed_distance`.
+
+    Returns
+    -------
+    TriangleMesh, or list of Polyline or Curve
+        The new boundary: closed, manifold, oriented like the shape.
+
+    See Also
+    --------
+    morphology.dilate : Grow by a distance.
+    morphology.opening : Shrink, then grow.
+    offset : The closed surface at a distance.
 
     Examples
     --------
@@ -190,7 +220,30 @@ def opening(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Erode, then dilate: removes parts thinner than twice the distance, rounds convex corners. See `dilate`.
+    """Erode, then dilate: remove parts thinner than twice the distance, and round convex corners.
+
+    Parameters
+    ----------
+    shape : shape, curves or polylines
+        As for `dilate`, and so are all errors.
+    distance : float
+        The offset, in the units of the shape; not negative.
+    domain : Grid, TetMesh, TriangleMesh or any other domain, optional
+        Domain of the distance; by default a grid around the shape.
+    resolution : int, optional
+        Number of nodes along the longest side of that grid; 128 by default.
+    measure : callable, optional
+        Called as ``measure(shape, domain)`` in place of `signed_distance`.
+
+    Returns
+    -------
+    TriangleMesh, or list of Polyline or Curve
+        The new boundary: closed, manifold, oriented like the shape.
+
+    See Also
+    --------
+    morphology.closing : Grow, then shrink.
+    morphology.erode : Shrink by a distance.
 
     Examples
     --------
@@ -211,7 +264,30 @@ def closing(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Dilate, then erode: fills gaps narrower than twice the distance, rounds concave corners. See `dilate`.
+    """Dilate, then erode: fill gaps narrower than twice the distance, and round concave corners.
+
+    Parameters
+    ----------
+    shape : shape, curves or polylines
+        As for `dilate`, and so are all errors.
+    distance : float
+        The offset, in the units of the shape; not negative.
+    domain : Grid, TetMesh, TriangleMesh or any other domain, optional
+        Domain of the distance; by default a grid around the shape.
+    resolution : int, optional
+        Number of nodes along the longest side of that grid; 128 by default.
+    measure : callable, optional
+        Called as ``measure(shape, domain)`` in place of `signed_distance`.
+
+    Returns
+    -------
+    TriangleMesh, or list of Polyline or Curve
+        The new boundary: closed, manifold, oriented like the shape.
+
+    See Also
+    --------
+    morphology.opening : Shrink, then grow.
+    morphology.dilate : Grow by a distance.
 
     Examples
     --------
@@ -263,6 +339,13 @@ def offset(
         If the surface passes through no cell of the grid.
     SignedHeatError
         If a distance is not finite, or an array does not have one distance for each vertex.
+
+    See Also
+    --------
+    Solid.surface : The closed surface.
+    morphology.shell : The layer between two offsets.
+    morphology.thicken : Make a solid of an open sheet.
+    morphology.dilate : Grow by a distance.
 
     Examples
     --------
@@ -339,6 +422,11 @@ def shell(
         If faces are to be kept but do not join with their completion.
     UnsupportedTypeError
         If the domain is not a grid, or a resolution is given beside it.
+
+    See Also
+    --------
+    offset : The closed surface at a distance.
+    morphology.thicken : Make a solid of an open sheet.
 
     Examples
     --------
@@ -426,6 +514,12 @@ def thicken(
         If a thickness is negative or not finite, both are zero, or the solid is thinner than a grid cell.
     UnsupportedTypeError
         If the domain is not a grid, or a resolution is given beside it.
+
+    See Also
+    --------
+    morphology.shell : The layer between two offsets.
+    wall_thickness : How thick walls are.
+    offset : The closed surface at a distance.
 
     Examples
     --------

@@ -98,6 +98,13 @@ def sharpen(
     SourceError
         If the field cannot be sharpened to a source of this kind.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    redistance : Distance from an array of values or signs.
+    methods.Geodesic : Sharpening by exact geodesic distance.
+    methods.Convex : The paper's way to sharpen.
+
     Examples
     --------
     >>> import numpy as np

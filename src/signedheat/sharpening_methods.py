@@ -206,6 +206,11 @@ class Geodesic(Method):
         On surfaces, neighbouring windows on an edge are merged if that changes distances by less than this fraction of
         the edge. 0 is exact, and takes time proportional to the number of faces to the power of 1.5.
 
+    See Also
+    --------
+    sharpen : Distance to the zero set of a field.
+    methods.Convex : The paper's way to sharpen.
+
     Examples
     --------
     >>> Geodesic()
@@ -248,6 +253,11 @@ class Convex(Method):
         Largest number of iterations; the residuals are in the diagnostics.
     relaxation : float
         Over-relaxation, from 1 to below 2.
+
+    See Also
+    --------
+    sharpen : Distance to the zero set of a field.
+    methods.Geodesic : Sharpening by exact geodesic distance.
 
     Examples
     --------

@@ -78,6 +78,14 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     ValueError
         If `diffusion` is not positive and finite.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    sharpen : Distance to the zero set of a field.
+    piecewise_distance : Distance to curves that bound no region.
+    methods.Extrapolated : Extrapolation in diffusion time.
+    constraints.ZeroSet : Zero on the source.
+
     Examples
     --------
     A quarter of a circle from the equator of a ball to its pole:

@@ -52,6 +52,11 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     MissingPackageError
         If PyTorch is not installed.
 
+    See Also
+    --------
+    Solid.distance : Exact distance of points.
+    sample_distances : Points with their distances, to learn from.
+
     Examples
     --------
     >>> import signedheat as sh

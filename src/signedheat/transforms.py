@@ -49,6 +49,11 @@ def transform(
     GeometryError
         If the matrix has another form, or flattens the shape.
 
+    See Also
+    --------
+    as_shape : Convert objects of other packages.
+    read : Read a shape or a solid.
+
     Examples
     --------
     >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])

@@ -73,6 +73,11 @@ class Sampling:
     layout : "arrays" or "deepsdf"
         Layout of the file.
 
+    See Also
+    --------
+    batches.Job : What is computed for each shape.
+    sample_distances : Points with their distances, to learn from.
+
     Examples
     --------
     >>> Job(samples=Sampling(n=10_000, seed=3)).samples.near
@@ -118,6 +123,12 @@ class Job:
     SignedHeatError
         If nothing is asked for, samples or a band are asked for of a plain field, offsets lie beyond the band or are
         not numbers, or an extension is not known for a field or a surface.
+
+    See Also
+    --------
+    batches.run : Run a job on many shapes.
+    batches.Sampling : How points are sampled.
+    batches.Watertight : How closed surfaces are made.
 
     Examples
     --------
@@ -286,6 +297,11 @@ class Watertight:
     units : str, optional
         Unit of all lengths, such as ``"mm"``. Files that state another unit are scaled to it; those that state none
         are taken to be in it already, or, with ``"inch:mm"``, in inches.
+
+    See Also
+    --------
+    batches.Job : What is computed for each shape.
+    Solid.surface : The closed surface.
 
     Examples
     --------

@@ -41,6 +41,11 @@ class Outcome:
     source : tuple of int
         Size of the file in bytes, and its time of modification in nanoseconds.
 
+    See Also
+    --------
+    batches.run : Run a job on many shapes.
+    batches.Batch : What became of all shapes.
+
     Examples
     --------
     >>> Outcome("ball", "parts/ball.stl", "failed", 0.1, "the file is empty").is_done

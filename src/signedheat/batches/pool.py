@@ -265,6 +265,11 @@ class Batch:
     skipped : int
         Number of shapes that an earlier run had done.
 
+    See Also
+    --------
+    batches.run : Run a job on many shapes.
+    batches.Outcome : What became of one shape.
+
     Examples
     --------
     >>> from signedheat.batches import Outcome
@@ -341,6 +346,11 @@ def run(
         If the job cannot be sent to workers, a number is out of range, or another batch is writing into the folder.
     MissingPackageError
         If a scheduler is given and Dask is not installed.
+
+    See Also
+    --------
+    batches.Job : What is computed for each shape.
+    batches.Batch : What became of all shapes.
 
     Examples
     --------

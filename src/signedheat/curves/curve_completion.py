@@ -80,6 +80,13 @@ def close_curves(
     SourceError
         If no curve is oriented, or one does not fit the surface.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    piecewise_distance : Distance to curves that bound no region.
+    orientation : The same, and what was flipped.
+    io.write_curves : Write curves on a surface.
+
     Examples
     --------
     A straight line with a gap, on a flat strip of triangles.

@@ -108,6 +108,12 @@ def piecewise_distance(
     ValueError
         If `diffusion` is not positive and finite.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    close_curves : Close the gaps of curves on a surface.
+    PiecewiseField : Values that may jump on a surface.
+
     Examples
     --------
     >>> from signedheat.diagnostics import Jumps

@@ -87,6 +87,11 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
     diagnostics : Diagnostics
         Timings, diffusion time, and the notes described in `signedheat.piecewise_distance`.
 
+    See Also
+    --------
+    piecewise_distance : Distance to curves that bound no region.
+    VertexField : Values on a surface.
+
     Examples
     --------
     A step across the diagonal of a square:

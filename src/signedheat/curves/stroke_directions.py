@@ -296,6 +296,11 @@ class CurveOrientation(Frozen, ShortRepr):
         How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do.
         It is 1 for curves and points that are never turned.
 
+    See Also
+    --------
+    orientation : The same, and what was flipped.
+    orient : Flip faces or curves so that they agree.
+
     Examples
     --------
     >>> from signedheat import samples

@@ -63,6 +63,11 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
     GeometryError
         If the spacing is not positive and finite, or an axis has fewer than two nodes.
 
+    See Also
+    --------
+    GridField : Values on a grid.
+    signed_distance : Distance on a grid, on tets or along a surface.
+
     Examples
     --------
     >>> grid = Grid(origin=(0, 0, 0), spacing=0.5, shape=(3, 4, 5))

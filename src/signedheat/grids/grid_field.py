@@ -69,6 +69,13 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     GeometryError
         If the values do not have the shape of the grid, or that of the blocks.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    read_field : Read a field.
+    Grid : A regular grid in space or in the plane.
+    redistance : Distance from an array of values or signs.
+
     Examples
     --------
     >>> grid = Grid(origin=(-1, -1, -1), spacing=0.1, shape=(21, 21, 21))

@@ -40,6 +40,12 @@ class Polyline(Displayed, Frozen):
     GeometryError
         If a coordinate is NaN or infinite, or there are fewer than two distinct points.
 
+    See Also
+    --------
+    io.read_polylines : Read lines in the plane.
+    signed_distance : Distance on a grid, on tets or along a surface.
+    Curve : A curve on a surface.
+
     Examples
     --------
     >>> square = Polyline([[0, 0], [0, 1], [1, 1], [1, 0]], closed=True)

@@ -30,6 +30,10 @@ class Closest:
     confidence : (...) float
         1 on the given surface; on the completion less, the farther from its rim.
 
+    See Also
+    --------
+    Solid.closest : Nearest places on the surface.
+
     Examples
     --------
     >>> from signedheat import complete, samples

@@ -69,6 +69,11 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     SourceError
         If the curves do not fit the surface, or have gaps that `strict` forbids.
 
+    See Also
+    --------
+    io.write_curves : Write curves on a surface.
+    Curve : A curve on a surface.
+
     Examples
     --------
     >>> import tempfile, signedheat as sh
@@ -127,6 +132,11 @@ def write_curves(
     ------
     FileFormatError
         If the format is unknown or the file cannot be written.
+
+    See Also
+    --------
+    io.read_curves : Read curves on a surface.
+    close_curves : Close the gaps of curves on a surface.
 
     Examples
     --------

@@ -330,6 +330,11 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     GeometryError
         If a polyline is invalid.
 
+    See Also
+    --------
+    io.write_polylines : Write lines in the plane.
+    Polyline : A line in the plane.
+
     Examples
     --------
     >>> import tempfile
@@ -368,6 +373,11 @@ def write_polylines(lines: Polyline | Sequence[Polyline], path: PathLike) -> Non
     ------
     FileFormatError
         If there is no polyline, the format is unknown or the file cannot be written.
+
+    See Also
+    --------
+    io.read_polylines : Read lines in the plane.
+    Polyline : A line in the plane.
 
     Examples
     --------

@@ -121,6 +121,11 @@ def read_field(path: PathLike) -> Field:
     FileFormatError
         If the file is missing, of unknown format, truncated, damaged, or has no scalar image along x, y, z.
 
+    See Also
+    --------
+    read : Read a shape or a solid.
+    signed_distance : Distance on a grid, on tets or along a surface.
+
     Examples
     --------
     >>> import tempfile, numpy as np, signedheat as sh

@@ -255,6 +255,10 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     MissingPackageError
         If Open CASCADE (cadquery-ocp) is not installed.
 
+    See Also
+    --------
+    read : Read a shape or a solid.
+
     Examples
     --------
     >>> mesh, cad_faces = read_step("part.step", deflection=0.01)  # doctest: +SKIP

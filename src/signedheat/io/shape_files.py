@@ -115,6 +115,14 @@ def read(path: PathLike) -> Shape | Solid:
     GeometryError
         If the shape is invalid: no element, NaN or infinite coordinates, a vertex id that does not exist.
 
+    See Also
+    --------
+    save : Write a shape.
+    read_field : Read a field.
+    io.read_labels : Read an image of labels.
+    io.read_curves : Read curves on a surface.
+    as_shape : Convert objects of other packages.
+
     Examples
     --------
     >>> import tempfile, signedheat as sh
@@ -171,6 +179,11 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
         If the format is unknown, does not support this kind of shape, or the file cannot be written.
     UnsupportedTypeError
         If it is no shape.
+
+    See Also
+    --------
+    read : Read a shape or a solid.
+    Solid.surface : The closed surface.
 
     Examples
     --------

@@ -70,6 +70,11 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
         If the name does not end in ``.vdb``, the field is not on a grid in space, its values are too large for 16
         bits, or the file cannot be written.
 
+    See Also
+    --------
+    GridField : Values on a grid.
+    read_field : Read a field.
+
     Examples
     --------
     >>> import tempfile, signedheat as sh

@@ -61,6 +61,11 @@ class LabelImage(Represented, Frozen):
     GeometryError
         If the image does not have three axes, or they are not at right angles.
 
+    See Also
+    --------
+    io.read_labels : Read an image of labels.
+    DigitalSurface : The boundary of voxels.
+
     Examples
     --------
     >>> image = LabelImage(np.full((3, 4, 5), 7), axes=2.0 * np.eye(3), origin=np.zeros(3))
@@ -288,6 +293,12 @@ def read_labels(path: PathLike) -> LabelImage:
     MissingPackageError
         If it is a NIfTI file, and nibabel is not installed.
 
+    See Also
+    --------
+    io.LabelImage : An image of labels.
+    io.read_volume : Read voxels.
+    read : Read a shape or a solid.
+
     Examples
     --------
     >>> import tempfile
@@ -324,6 +335,11 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
         If the file is missing, of unknown format, truncated or damaged.
     GeometryError
         If the image is not a set of voxels.
+
+    See Also
+    --------
+    io.read_labels : Read an image of labels.
+    DigitalSurface : The boundary of voxels.
 
     Examples
     --------

@@ -178,6 +178,13 @@ def complete(
     InexactWarning
         If more than a quarter of the surface of a mesh is completed: what is missing is a guess.
 
+    See Also
+    --------
+    Solid : What a shape bounds, closed.
+    fill_holes : Close holes, and leave the rest of a mesh as it is.
+    orient : Flip faces or curves so that they agree.
+    signed_distance : Distance on a grid, on tets or along a surface.
+
     Examples
     --------
     >>> from signedheat import samples

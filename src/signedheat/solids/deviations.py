@@ -63,6 +63,10 @@ class Deviation(Frozen):
         Whether points lie beyond the rim of an open part, such as a panel or a terrain. Their sign is that of the
         continued surface.
 
+    See Also
+    --------
+    deviation : Compare a scan with a part.
+
     Examples
     --------
     >>> import signedheat as sh
@@ -282,6 +286,12 @@ def deviation(
     ------
     SourceError
         If the scan is neither a mesh nor points in space, or has no points.
+
+    See Also
+    --------
+    results.Deviation : Deviations of a scan.
+    wall_thickness : How thick walls are.
+    Solid.closest : Nearest places on the surface.
 
     Examples
     --------

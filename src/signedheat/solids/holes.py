@@ -50,12 +50,22 @@ class Filled:
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledMesh(Filled, TriangleMesh):
-    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones; see `Filled`."""
+    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones; see `Filled`.
+
+    See Also
+    --------
+    fill_holes : Close holes, and leave the rest of a mesh as it is.
+    """
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledPolygonMesh(Filled, PolygonMesh):
-    """Polygons whose holes were closed: those that were given, then triangles; see `Filled`."""
+    """Polygons whose holes were closed: those that were given, then triangles; see `Filled`.
+
+    See Also
+    --------
+    fill_holes : Close holes, and leave the rest of a mesh as it is.
+    """
 
 
 @overload
@@ -109,6 +119,12 @@ def fill_holes(
         If the shape is no mesh.
     SourceError
         If no rim passes through one of the vertices.
+
+    See Also
+    --------
+    complete : Make a solid of a broken shape.
+    orient : Flip faces or curves so that they agree.
+    results.FilledMesh : A mesh whose holes are closed.
 
     Examples
     --------

@@ -179,6 +179,12 @@ def contour(
     MemoryLimitError
         If the grid does not fit in memory. Raised before anything is computed.
 
+    See Also
+    --------
+    redistance : Distance from an array of values or signs.
+    Solid.surface : The closed surface.
+    offset : The closed surface at a distance.
+
     Examples
     --------
     >>> def box(points):

@@ -64,6 +64,11 @@ class Orientation(Frozen, ShortRepr):
     nested_bodies, cavities : int
         Pieces within others: those that are bodies as well, and those that are walls of cavities.
 
+    See Also
+    --------
+    orientation : The same, and what was flipped.
+    orient : Flip faces or curves so that they agree.
+
     Examples
     --------
     >>> from signedheat import samples
@@ -149,6 +154,13 @@ def orientation(
         If the shape is no mesh, and no domain is given.
     SourceError
         If a curve does not fit the domain.
+
+    See Also
+    --------
+    orient : Flip faces or curves so that they agree.
+    results.Orientation : How a mesh was oriented.
+    results.CurveOrientation : How curves were oriented.
+    complete : Make a solid of a broken shape.
 
     Examples
     --------
@@ -278,6 +290,12 @@ def orient(
         If the shape is no mesh, and no domain is given.
     SourceError
         If a curve does not fit the domain.
+
+    See Also
+    --------
+    orientation : The same, and what was flipped.
+    complete : Make a solid of a broken shape.
+    fill_holes : Close holes, and leave the rest of a mesh as it is.
 
     Examples
     --------

@@ -38,6 +38,11 @@ class Samples:
     radius : float
         Distance from the centre to the farthest place of the surface.
 
+    See Also
+    --------
+    sample_distances : Points with their distances, to learn from.
+    batches.Sampling : How points are sampled.
+
     Examples
     --------
     >>> import numpy as np

@@ -66,6 +66,13 @@ def sample_distances(
         If n is not positive, the seed or a width is negative, the fraction is not from 0 to 1, or there is no width for
         points near the surface.
 
+    See Also
+    --------
+    Solid.sample : The same for a solid.
+    results.Samples : Points with their distances.
+    batches.run : Run a job on many shapes.
+    torch.distance : Distances that PyTorch differentiates.
+
     Examples
     --------
     >>> from signedheat import samples, signed_distance

@@ -79,6 +79,13 @@ class Solid(Displayed, Represented, Frozen):
     diagnostics : Diagnostics
         Notes on faces that were turned, left out and added.
 
+    See Also
+    --------
+    complete : Make a solid of a broken shape.
+    signed_distance : Distance on a grid, on tets or along a surface.
+    offset : The closed surface at a distance.
+    deviation : Compare a scan with a part.
+
     Examples
     --------
     >>> from signedheat import complete, samples

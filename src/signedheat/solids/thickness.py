@@ -85,6 +85,10 @@ class Thickness(Frozen):
     origins : (m,) int
         Face of the shape that each face is part of; −1 in the completion.
 
+    See Also
+    --------
+    wall_thickness : How thick walls are.
+
     Examples
     --------
     >>> import signedheat as sh
@@ -218,6 +222,12 @@ def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
         If the shape bounds nothing.
     MemoryLimitError
         If so many faces do not fit in memory.
+
+    See Also
+    --------
+    results.Thickness : Thickness on each face.
+    morphology.thicken : Make a solid of an open sheet.
+    deviation : Compare a scan with a part.
 
     Examples
     --------

@@ -61,6 +61,12 @@ class DigitalSurface(Displayed, Surface):
         If the volume is not a three-dimensional array of booleans (or zeros and ones), is empty, the spacing is not
         positive, or the radius is negative.
 
+    See Also
+    --------
+    io.LabelImage : An image of labels.
+    io.read_volume : Read voxels.
+    redistance : Distance from an array of values or signs.
+
     Notes
     -----
     Voxels that touch along an edge only are connected there; voxels that touch at a corner only are not. `vertices` are

@@ -43,6 +43,10 @@ class Extrapolated:
     ValueError
         If `tau` is not positive and finite.
 
+    See Also
+    --------
+    SignedHeatSolver : The signed heat method alone.
+
     Examples
     --------
     >>> import numpy as np

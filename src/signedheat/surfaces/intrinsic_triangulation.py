@@ -68,6 +68,11 @@ class IntrinsicTriangulation(Displayed, Frozen):
     close : (m,) bool
         Faces at vertices that nearly coincide, which refinement leaves thin.
 
+    See Also
+    --------
+    intrinsic_delaunay : Make an intrinsic triangulation.
+    common_subdivision : Cut a mesh along an intrinsic triangulation.
+
     Examples
     --------
     >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -415,6 +420,12 @@ def intrinsic_delaunay(
         four digits, or `angle`, `max_vertices` or `coarsest` is out of range.
     SourceError
         If a curve to be kept does not lie on the mesh.
+
+    See Also
+    --------
+    IntrinsicTriangulation : Better triangles on the same surface.
+    common_subdivision : Cut a mesh along an intrinsic triangulation.
+    SignedHeatSolver : The signed heat method alone.
 
     Examples
     --------

@@ -76,6 +76,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         If there are no points, a value is NaN or infinite, a normal is zero, an area is not positive, lengths
         differ, or neighbourhoods are smaller than 3.
 
+    See Also
+    --------
+    TriangleMesh : Triangles in space.
+    as_shape : Convert objects of other packages.
+    complete : Make a solid of a broken shape.
+
     Notes
     -----
     As a domain, a cloud needs no normals, and its normals need not be consistent. Normals and triangles are oriented

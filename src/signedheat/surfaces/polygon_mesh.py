@@ -47,6 +47,12 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         If there is no polygon, one has fewer than three corners or names a vertex that does not exist,
         or a coordinate is NaN or infinite.
 
+    See Also
+    --------
+    TriangleMesh : Triangles in space.
+    as_shape : Convert objects of other packages.
+    complete : Make a solid of a broken shape.
+
     Examples
     --------
     >>> mesh = PolygonMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]])

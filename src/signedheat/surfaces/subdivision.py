@@ -42,6 +42,11 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     GeometryError
         If the argument is not an intrinsic triangulation, or has triangles as thin as rounding.
 
+    See Also
+    --------
+    intrinsic_delaunay : Make an intrinsic triangulation.
+    IntrinsicTriangulation : Better triangles on the same surface.
+
     Examples
     --------
     >>> import signedheat as sh

@@ -45,6 +45,13 @@ class Curve(Frozen):
         If there are fewer than two points, a number is NaN or infinite, coordinates are not barycentric, or the number
         of normals is not that of the segments. Face ids are checked when the curve is used on its surface.
 
+    See Also
+    --------
+    SurfacePoints : Points on a surface.
+    io.read_curves : Read curves on a surface.
+    signed_distance : Distance on a grid, on tets or along a surface.
+    close_curves : Close the gaps of curves on a surface.
+
     Examples
     --------
     >>> across = Curve([0, 0], [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
@@ -134,6 +141,11 @@ class SurfacePoints(Frozen):
     ------
     SourceError
         If no point was given, a number is NaN or infinite, or coordinates are not barycentric.
+
+    See Also
+    --------
+    Curve : A curve on a surface.
+    signed_distance : Distance on a grid, on tets or along a surface.
 
     Examples
     --------

@@ -39,6 +39,13 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     GeometryError
         If there is no face, a coordinate is NaN or infinite, or a face names a vertex that does not exist.
 
+    See Also
+    --------
+    PolygonMesh : Polygons in space.
+    PointCloud : Points, with normals or without.
+    as_shape : Convert objects of other packages.
+    complete : Make a solid of a broken shape.
+
     Examples
     --------
     >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])

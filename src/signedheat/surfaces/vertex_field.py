@@ -71,6 +71,12 @@ class VertexField(Displayed, Combinable, Frozen, Generic[Surface]):
     GeometryError
         If there is not one number for each vertex.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    SignedHeatSolver : The signed heat method alone.
+    PiecewiseField : Values that may jump on a surface.
+
     Examples
     --------
     >>> import signedheat as sh

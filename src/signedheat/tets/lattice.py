@@ -71,6 +71,11 @@ def tetrahedralize(
     MemoryLimitError
         If the lattice would have more than 50 million tets.
 
+    See Also
+    --------
+    TetMesh : Tetrahedra.
+    signed_distance : Distance on a grid, on tets or along a surface.
+
     Notes
     -----
     On lattices, heat decays slightly faster along some directions than others. `sharpen` removes the resulting error; a

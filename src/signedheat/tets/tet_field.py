@@ -161,6 +161,11 @@ class TetField(Displayed, Combinable, Frozen):
     GeometryError
         If there is not one value per vertex.
 
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    TetMesh : Tetrahedra.
+
     Examples
     --------
     >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])

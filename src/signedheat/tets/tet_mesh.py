@@ -51,6 +51,11 @@ class TetMesh(Displayed, Frozen):
         If there is no tet, a coordinate is NaN or infinite, a tet names a vertex that does not exist, or no tet has
         any volume.
 
+    See Also
+    --------
+    tetrahedralize : Fill a shape with tets.
+    TetField : Values on tets.
+
     Examples
     --------
     >>> mesh = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 3, 2]])
