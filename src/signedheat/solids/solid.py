@@ -46,6 +46,7 @@ unions: Any = lazy_module("signedheat.solids.union", "solids")
 
 if TYPE_CHECKING:
     import pyvista
+    import trimesh
 
 POINTS_SORTED = 1 << 18
 """Batch size for sorting points."""
@@ -558,6 +559,22 @@ class Solid(Displayed, Represented, Frozen):
 
     def to_pyvista(self) -> pyvista.PolyData:
         return self.boundary.to_pyvista()
+
+    def to_trimesh(self) -> trimesh.Trimesh:
+        """Convert the surface to trimesh.
+
+        Returns
+        -------
+        trimesh.Trimesh
+            All faces, including the completion and sheets (`boundary`).
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> sh.complete(sh.samples.without_faces(sh.samples.sphere(1), 0.1)).to_trimesh().is_watertight
+        True
+        """
+        return self.boundary.to_trimesh()
 
     def __repr__(self) -> str:
         areas, made = face_areas(self.triangles), self.origins < 0

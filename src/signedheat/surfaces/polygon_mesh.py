@@ -125,6 +125,21 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         """(2, 3) lower and upper corner of the bounding box of the polygons, without unreferenced vertices."""
         return used_bounds(self.vertices, self.corners)
 
+    @property
+    def area(self) -> float:
+        """Area of all polygons, in square units."""
+        return self.triangulation.area
+
+    @property
+    def volume(self) -> float:
+        """Volume inside a watertight mesh: see `TriangleMesh.volume`."""
+        return self.triangulation.volume
+
+    @property
+    def is_watertight(self) -> bool:
+        """Whether as many polygons run along every edge one way as the other: see `TriangleMesh.is_watertight`."""
+        return self.triangulation.is_watertight
+
     @cached_property
     def corner_polygons(self) -> Ints:
         """Polygon of each entry of `corners`."""

@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
+from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
-from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
-from ..mesh.triangles import area_vectors
+from ..mesh.triangles import area_vectors, part_volumes
 from ..mesh.welding import SEAM_UNITS, joined_rims
 from ..search.nearest_triangles import TriangleTree
 from ..validation import coordinates, element_ids, used_bounds
@@ -97,6 +98,38 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     def face_areas(self) -> Floats:
         """(m,) areas."""
         return np.linalg.norm(self.face_area_vectors, axis=1)
+
+    @property
+    def area(self) -> float:
+        """Area of all faces, in square units."""
+        return float(self.face_areas.sum())
+
+    @property
+    def volume(self) -> float:
+        """Volume inside a watertight mesh, in cubic units; negative if it faces inwards, and twice where it overlaps.
+
+        Raises
+        ------
+        GeometryError
+            If the mesh is not watertight; ``sh.complete(mesh).volume`` is that of any shape.
+
+        Examples
+        --------
+        >>> from signedheat import samples
+        >>> round(samples.sphere(4).volume, 2)
+        4.18
+        """
+        if not self.is_watertight:
+            raise GeometryError("the mesh is not watertight", remedy="use sh.complete(mesh).volume", element="faces")
+        return float(part_volumes(self.vertices, self.places[self.faces])[1].sum())
+
+    @cached_property
+    def is_watertight(self) -> bool:
+        """Whether as many faces run along every edge one way as the other; vertices at the same place count as one."""
+        tails = self.places[self.faces].ravel()
+        heads = np.roll(tails.reshape(-1, 3), -1, axis=1).ravel()
+        edges = np.unique(edge_keys(tails, heads), return_inverse=True)[1].ravel()
+        return not np.bincount(edges, np.sign(heads - tails)).any()
 
     @cached_property
     def edge_lengths(self) -> Floats:
