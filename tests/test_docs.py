@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import inspect
 import re
@@ -66,6 +67,31 @@ def test_code_of_pages_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     blocks = re.findall(r"```python\n(.*?)```", text, re.S)
     assert blocks
     exec(compile("\n".join(blocks), f"docs/{name}.md", "exec", dont_inherit=True), {"__name__": "__main__"})
+
+
+COMING = (ROOT / "docs" / "coming-from.md").read_text(encoding="utf-8")
+ROWS = [row.replace("\\|", "|") for row in re.findall(r"^\| .* \| `([^`]*)` \|$", COMING, re.M)]
+
+
+@functools.cache
+def before_rows():
+    names: dict[str, object] = {}
+    exec("\n".join(re.findall(r"```python\n(.*?)```", COMING, re.S)), names)
+    return names
+
+
+def test_thirty_verbs_of_other_packages_are_there():
+    rows = re.findall(r"^\| (?!there|---)(.*?) \| `", COMING, re.M)
+    assert len(rows) == len(ROWS) >= 30
+
+
+@pytest.mark.filterwarnings("ignore::signedheat.errors.InexactWarning")  # on a coarse grid
+@pytest.mark.parametrize("row", sorted(set(ROWS)))
+def test_rows_for_users_of_other_packages_run(row, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = dict(before_rows())
+    names["mesh"].save("part.stl")
+    assert eval(row, names) is not None or row.startswith("mesh.save")
 
 
 def test_extending_has_an_example_of_each_kind():
