@@ -40,6 +40,14 @@ def pytest_sessionstart(session: pytest.Session) -> None:
             pytest.exit(f"signedheat warmup failed with status {done.returncode}", returncode=1)
 
 
+@pytest.fixture(autouse=True)
+def nothing_to_announce() -> None:
+    """What a test must not print does not depend on what is compiled already."""
+    from signedheat.compiled import announce  # imports NumPy, which must know the number of threads
+
+    announce.is_made = True
+
+
 def pytest_collection_finish() -> None:
     """Spare the garbage collector what packages and tests hold until the end, a million objects."""
     gc.freeze()

@@ -55,6 +55,17 @@ def test_a_number_written_in_a_kernel_needs_no_compilation_of_its_own():
     assert len(half.part.signatures) == 1
 
 
+def test_compiling_is_announced_once_wherever_standard_error_goes(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment.pop("NUMBA_DISABLE_JIT", None)
+    code = """from signedheat import TriangleMesh
+mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+mesh.edges, mesh.places"""
+    for wanted in (1, 0):  # compiled, then read from the cache
+        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        assert done.stderr.count("signedheat: compiling what this needs") == wanted and done.stdout == ""
+
+
 def test_kernels_are_compiled_once():
     """Whether arrays are read-only, and how they lie in memory, makes no second compilation."""
     code = """

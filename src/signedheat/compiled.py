@@ -41,7 +41,9 @@ Parameters = ParamSpec("Parameters")
 Returned = TypeVar("Returned")
 made: list[Kernel[..., Any]] = []
 """The kernels that this process has used."""
-announce: Announcement = Announcement("compiling what this needs, once (signedheat warmup compiles all)")
+announce: Announcement = Announcement(
+    "compiling what this needs, once, for up to a minute (signedheat warmup compiles all)", everywhere=True
+)
 
 
 class Kernel(Generic[Parameters, Returned]):
@@ -100,6 +102,7 @@ class Kernel(Generic[Parameters, Returned]):
                     logger.info("compiled in every process: %s", error)
                 finally:
                     numba.config.CACHE_DIR = wanted
+            announce()
             return _of_numbers(numba.njit(**options)(self.function))
 
 

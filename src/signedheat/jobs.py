@@ -29,22 +29,26 @@ Progress = Callable[[float, str], None]
 
 
 class Announcement:
-    """A message that is logged once per process, and printed in terminals and notebooks."""
+    """A message that is logged once per process, and printed on standard error in terminals and notebooks.
+
+    Where people would wait without knowing for what, it is printed everywhere (`everywhere`).
+    """
 
     are_wanted = True
     """Whether announcements are printed."""
 
-    def __init__(self, text: str) -> None:
-        self._text, self._is_made = text, False
+    def __init__(self, text: str, everywhere: bool = False) -> None:
+        self._text, self._everywhere, self.is_made = text, everywhere, False
 
     def __call__(self) -> None:
-        if self._is_made:
+        if self.is_made:
             return
-        self._is_made = True
+        self.is_made = True
         logger.info(self._text)
         is_terminal = sys.stderr is not None and sys.stderr.isatty()
-        if self.are_wanted and (is_terminal or "ipykernel" in sys.modules):
+        if self.are_wanted and sys.stderr and (self._everywhere or is_terminal or "ipykernel" in sys.modules):
             sys.stderr.write(f"{CLEAR_LINE if is_terminal else ''}signedheat: {self._text}\n")
+            sys.stderr.flush()
 
 
 class Stopwatch:

@@ -31,7 +31,7 @@ from typing import Any
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
-from ..jobs import MOST_THREADS, Progress, command_for, logger
+from ..jobs import MOST_THREADS, Announcement, Progress, command_for, logger
 from ..packages import require
 from ..parallel import connected, n_threads
 from ..validation import positive_number, whole_number
@@ -218,6 +218,7 @@ def do_apart(task: Task, threads: int, time_limit: float | None) -> Done:
 def serve() -> None:
     """Serve tasks from standard input: announce readiness, run a task and write its result, in turn."""
     signal(SIGINT, SIG_IGN)  # the parent process handles it
+    Announcement.are_wanted = False  # what is written to standard error explains failures
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # printed text must not mix with the answers
     with suppress(OSError):
