@@ -35,7 +35,7 @@ FLOORS = [
     ("search   linear   exchange", "nearest faces, winding numbers; sparse solvers; other packages", "#c9dcee"),
     ("mesh", "arrays in, arrays out: edges, welding, components, cutting, intrinsic meshes", "#bccfe8"),
     (
-        ("arrays calls compiled diagnostics errors jobs memory packages parallel validation"),
+        ("arrays calls compiled diagnostics errors jobs memory packages parallel validation words"),
         "used by all",
         "#d9d9e3",
     ),

@@ -28,6 +28,7 @@ FLOORS = [
         "packages",
         "parallel",
         "validation",
+        "words",
     },
     {"mesh"},
     {"search", "linear", "exchange"},

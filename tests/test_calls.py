@@ -122,3 +122,38 @@ def test_commands_of_other_programs(capsys):
         assert word not in names and set(ours.replace(",", "").replace(" or", "").split()) <= names
     assert main(["repair", "part.stl"]) == 2
     assert "watertight" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, np.float32("nan")], ids=str)
+def test_fields_are_not_combined_with_what_is_no_number(number):
+    for field in (sh.VertexField(BALL, V[:, 2]), sh.GridField(sh.Grid(0.0, 1.0, 3), [-1.0, 0.0, 1.0])):
+        for operation in (
+            lambda phi: phi + number,
+            lambda phi: number + phi,
+            lambda phi: phi - number,
+            lambda phi: number - phi,
+            lambda phi: phi * number,
+            lambda phi: phi / number,
+            lambda phi: phi / 0.0,
+        ):
+            with refused(sh.SignedHeatError, element="number"):
+                operation(field)
+
+
+def test_other_kinds_of_things():
+    with refused(sh.errors.UnsupportedTypeError):
+        sh.SignedHeatSolver(b"x")
+    with refused(sh.errors.GeometryError, element="space"):
+        sh.io.LabelImage(np.ones((2, 2, 2), int), np.eye(3), np.zeros(3), space=np.nan)
+    with refused(sh.SignedHeatError, element="nested"):
+        sh.orientation(BALL, nested="abc")
+    with refused(sh.errors.GeometryError, element="values") as caught:
+        sh.redistance(np.pad(np.ones((5, 5), np.uint8), 3))
+    assert "numpy.where" in caught.value.remedy
+
+
+def test_progress_of_sharpening_ends_whatever_the_field_is():
+    for field in (sh.complete(BALL).field(4), sh.VertexField(BALL, V[:, 2])):
+        told = []
+        sh.sharpen(field, progress=lambda fraction, step, told=told: told.append(fraction))
+        assert told[-1] == 1.0

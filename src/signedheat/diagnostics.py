@@ -9,6 +9,7 @@ from typing import ClassVar, TypeVar
 import numpy as np
 
 from .arrays import Frozen, Ints, ShortRepr
+from .words import Sentence, percent
 
 SMALL_SHARE = 0.005
 """Fraction of the surface up to which its completion, and parts that bound nothing or that a contour misses, are not
@@ -27,7 +28,7 @@ class Note(Frozen, ShortRepr):
     limits: ClassVar[Mapping[str, float]] = {}
 
     def __str__(self) -> str:
-        return self.text.format(self)
+        return Sentence().format(self.text, self)
 
     @property
     def important(self) -> bool:
@@ -137,7 +138,7 @@ class SampledSource(Note):
     area_outside: float
     area_cancelled: float
     text: ClassVar[str] = (
-        "{0.samples} samples of the source; {0.area_outside:.3g} of its area lies outside the grid, "
+        "{0.samples:sample} of the source; {0.area_outside:.3g} of its area lies outside the grid, "
         "{0.area_cancelled:.3g} cancels"
     )
 
@@ -151,7 +152,7 @@ class OutsideMesh(Note):
 
     def __str__(self) -> str:
         shares = zip(self.sources_outside, self.area_left_out, strict=True)
-        return "; ".join(f"source {k} outside the mesh: {100 * part:.3g} % of its area, left out" for k, part in shares)
+        return "; ".join(f"source {k} outside the mesh: {percent(part)} of its area, left out" for k, part in shares)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -170,12 +171,12 @@ class ShapeOriented(Note):
 
     def __str__(self) -> str:
         texts = [
-            (self.turned_faces, f"faces turned: {self.turned_faces}, {self.turned_area:.1%} of the area"),
+            (self.turned_faces, f"faces turned: {self.turned_faces}, {percent(self.turned_area)} of the area"),
             (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
             (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
             (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
             (self.cavities, f"cavities: {self.cavities}"),
-            (self.undecided_area, f"sheets without an inside: {self.undecided_area:.1%} of the area"),
+            (self.undecided_area, f"sheets without an inside: {percent(self.undecided_area)} of the area"),
         ]
         return "; ".join(text for value, text in texts if value) or "faces are oriented as they were given"
 
@@ -187,7 +188,7 @@ class OrientedPoints(Note):
     normals_fitted: int
     normals_turned: int
     limits: ClassVar[Mapping[str, float]] = {"normals_fitted": 0, "normals_turned": 0}
-    text: ClassVar[str] = "{0.normals_fitted} normals fitted, {0.normals_turned} turned"
+    text: ClassVar[str] = "{0.normals_fitted:normal} fitted, {0.normals_turned} turned"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -208,7 +209,7 @@ class LeftOut(Note):
     cut_faces: int = 0  # faces that lie inside in part, and were cut
     limits: ClassVar[Mapping[str, float]] = {"covered_faces": 0}
     text: ClassVar[str] = (
-        "left out: {0.covered_faces} faces, {0.covered_area:.1%} of the area, that lie inside other bodies "
+        "left out: {0.covered_faces:face}, {0.covered_area:%} of the area, that lie inside other bodies "
         "({0.cut_faces} of them in part)"
     )
 
@@ -220,7 +221,7 @@ class FacesRestored(Note):
     restored_faces: int
     restored_area: float
     limits: ClassVar[Mapping[str, float]] = {"restored_faces": 0}
-    text: ClassVar[str] = "lost faces restored: {0.restored_faces}, {0.restored_area:.1%} of the area"
+    text: ClassVar[str] = "lost faces restored: {0.restored_faces}, {0.restored_area:%} of the area"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -228,7 +229,7 @@ class SharpenedToShape(Note):
     """Fraction of the zero set's triangles to which distance is measured, in places where the shape has no faces."""
 
     completed_zero_set: float
-    text: ClassVar[str] = "{0.completed_zero_set:.1%} of the zero set completes the shape"
+    text: ClassVar[str] = "{0.completed_zero_set:%} of the zero set completes the shape"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -241,7 +242,7 @@ class CompletedArea(Note):
     limits: ClassVar[Mapping[str, float]] = {"completed_share": SMALL_SHARE}
 
     def __str__(self) -> str:
-        text = f"{self.completed_share:.1%} of the surface is completed"
+        text = f"{percent(self.completed_share)} of the surface is completed"
         if not len(self.where):
             return text
         lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in self.where[0])
@@ -254,7 +255,7 @@ class BoundsNothing(Note):
 
     open_area: float
     limits: ClassVar[Mapping[str, float]] = {"open_area": SMALL_SHARE}
-    text: ClassVar[str] = "{0.open_area:.1%} of the area bounds nothing: distance to it is positive on both sides"
+    text: ClassVar[str] = "{0.open_area:%} of the area bounds nothing: distance to it is positive on both sides"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -278,7 +279,7 @@ class LargeAngles(Note):
     """Fraction of angles above 120°, if it is 1 % or more: an intrinsic triangulation is then more accurate."""
 
     large_angles: float
-    text: ClassVar[str] = "{0.large_angles:.0%} of the angles exceed 120°"
+    text: ClassVar[str] = "{0.large_angles:%} of the angles exceed 120°"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -357,8 +358,8 @@ class SharpenedToCurves(Note):
     free_ends: int  # ends of oriented curves inside the surface, and points where curves run head to head
     sides_by_curves: float  # fraction of the vertices whose sign the curves decide; φ decides the others
     text: ClassVar[str] = (
-        "{0.completed_length:.1%} of the curve completed between {0.free_ends} free ends; curves decide the sign of "
-        "{0.sides_by_curves:.1%} of the vertices"
+        "{0.completed_length:%} of the curve completed between {0.free_ends} free ends; curves decide the sign of "
+        "{0.sides_by_curves:%} of the vertices"
     )
 
 
@@ -387,7 +388,7 @@ class ConvexRounds(Note):
 
     rounds: int
     residual: float
-    text: ClassVar[str] = "{0.rounds} rounds, residual {0.residual:.3g}"
+    text: ClassVar[str] = "{0.rounds:round}, residual {0.residual:.3g}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -405,4 +406,4 @@ class Jumps(Note):
 
     def __str__(self) -> str:
         cut = "continuous" if self.continuous else f"cuts of length {self.cut_length:.3g}"
-        return f"{cut}; objective within {self.gap:.2%} of the least"
+        return f"{cut}; objective within {percent(self.gap)} of the least"

@@ -342,7 +342,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         >>> import signedheat as sh
         >>> cells = [("triangle", [[0, 1, 2]])]
         >>> sh.TriangleMesh.from_meshio(meshio.Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], cells))
-        TriangleMesh(3 vertices, 1 faces)
+        TriangleMesh(3 vertices, 1 face)
         """
         return cls._of(from_meshio(thing, as_points=not cls._has_faces))
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .arrays import Bools, Floats
-from .errors import GeometryError, SourceError, UnsupportedTypeError
+from .errors import GeometryError, SignedHeatError, SourceError, UnsupportedTypeError
 from .grids.grid import Grid
 from .packages import lazy_module
 from .validation import finite_number
@@ -57,6 +57,15 @@ AnyField = TypeVar("AnyField", bound=HasValues)
 Solid = TypeVar("Solid", bound=SolidField)
 
 
+def _finite(number: Number) -> float:
+    """Return a number as a float; refuse NaN and infinity, which would leave no distance."""
+    if not np.isfinite(number):
+        raise SignedHeatError(
+            f"a field with {number} is no field of distances", remedy="use a finite number", element="number"
+        )
+    return float(number)
+
+
 class Arithmetic:
     """A field with arithmetic: ``-field``, ``abs(field)``, ``2 * field``, ``field / 2`` and ``field + 1`` are fields.
 
@@ -86,23 +95,27 @@ class Arithmetic:
         return self._mapped(np.abs)
 
     def __mul__(self: AnyField, factor: Number) -> AnyField:
-        return self._scaled(float(factor)) if isinstance(factor, NUMBER_TYPES) else NotImplemented
+        return self._scaled(_finite(factor)) if isinstance(factor, NUMBER_TYPES) else NotImplemented
 
     def __truediv__(self: AnyField, divisor: Number) -> AnyField:
         if not isinstance(divisor, NUMBER_TYPES):
             return NotImplemented
-        return self._scaled(1.0 / float(divisor)) if divisor else self._mapped(lambda phi: phi / divisor)
+        return self._scaled(_finite(1.0 / _finite(divisor) if divisor else np.inf))
 
     def __add__(self: AnyField, summand: Number) -> AnyField:
         if not isinstance(summand, NUMBER_TYPES):
             return NotImplemented
-        return self._mapped(lambda phi: phi + summand) if summand else self._scaled(1.0)
+        level = _finite(summand)
+        return self._mapped(lambda phi: phi + level) if level else self._scaled(1.0)
 
     def __sub__(self: AnyField, level: Number) -> AnyField:
         return Arithmetic.__add__(self, -float(level)) if isinstance(level, NUMBER_TYPES) else NotImplemented
 
     def __rsub__(self: AnyField, level: Number) -> AnyField:
-        return self._mapped(lambda phi: level - phi) if isinstance(level, NUMBER_TYPES) else NotImplemented
+        if not isinstance(level, NUMBER_TYPES):
+            return NotImplemented
+        number = _finite(level)
+        return self._mapped(lambda phi: number - phi)
 
     def _scaled(self: AnyField, factor: float) -> AnyField:
         return self._mapped(lambda phi: phi * factor)

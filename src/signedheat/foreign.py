@@ -136,7 +136,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
     --------
     >>> import signedheat as sh
     >>> as_shape(([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
-    TriangleMesh(3 vertices, 1 faces)
+    TriangleMesh(3 vertices, 1 face)
     """
     shape = converted(thing)
     if not isinstance(shape, TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh):

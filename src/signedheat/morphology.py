@@ -52,6 +52,7 @@ from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
 from .validation import array_of, finite_number, flag, numbers, positive_number, refuse_beside
+from .words import counted
 
 __all__ = [
     "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
@@ -576,7 +577,7 @@ def _linear(shape: Shapes, values: Floats) -> Reach:
     points = mesh.points if isinstance(mesh, PointCloud) else mesh.vertices
     if values.shape != (len(points),) or not np.isfinite(values).all():
         raise SignedHeatError(
-            f"there are {len(points)} vertices, and distances of shape {values.shape}, or not all are finite",
+            f"there are {counted(len(points), 'vertex')}, and distances of shape {values.shape}, or not all are finite",
             remedy="give one for each",
             element="distance",
         )

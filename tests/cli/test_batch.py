@@ -39,7 +39,7 @@ def test_batch_makes_what_is_asked_for_and_says_what_failed(tmp_path, folder, ca
 def test_a_list_on_standard_input(tmp_path, folder, capsys, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(f"{folder / 'ball.ply'}\n\n"))
     assert main(["batch", "-", "-o", str(tmp_path / "out"), "--info", "--workers", "1"]) == 0
-    assert "1 shapes, 1 done" in capsys.readouterr().out
+    assert "1 shape, 1 done" in capsys.readouterr().out
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
     assert main(["batch", "-", "-o", str(tmp_path / "out"), "--info"]) == 1
     assert "standard input" in capsys.readouterr().err

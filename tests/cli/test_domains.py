@@ -84,13 +84,13 @@ def test_offsets_in_the_plane(arcs, capsys):
     for name, radius in (("out_+0.2.svg", 1.2), ("out_-0.3.svg", 0.7)):
         [line] = sh.io.read_polylines(arcs / name)
         assert line.closed and line.signed_area == pytest.approx(-np.pi * radius**2, rel=0.02)
-    assert "1 lines (1 closed)" in succeed(capsys, "offset", arcs / "arcs.svg", "0.1", "-o", arcs / "one.csv")
+    assert "1 line (1 closed)" in succeed(capsys, "offset", arcs / "arcs.svg", "0.1", "-o", arcs / "one.csv")
 
 
 @pytest.mark.usefixtures("small_pictures")
 def test_contour_view_and_info_in_the_plane(arcs, capsys):
     succeed(capsys, "volume", arcs / "arcs.csv", "-o", arcs / "phi.vti", "--resolution", "48")
-    assert "1 lines" in succeed(capsys, "contour", arcs / "phi.vti", "0.1", "-o", arcs / "line.csv")
+    assert "1 line" in succeed(capsys, "contour", arcs / "phi.vti", "0.1", "-o", arcs / "line.csv")
     [line] = sh.io.read_polylines(arcs / "line.csv")
     np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), 1.1, atol=0.04)
     assert "lines in the plane" in fail(capsys, "contour", arcs / "phi.vti", "0.1", "-o", arcs / "line.stl")

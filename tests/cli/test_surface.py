@@ -75,7 +75,7 @@ def test_info_says_what_lies_where(tmp_path, capsys):
     assert second["open_ends"] == [] and second["at_vertices"] == 4 and second["along_edges"] == 4
     assert third["kind"] == "points"
     assert main(["info", str(tmp_path / "flat.ply"), str(tmp_path / "curves.json")]) == 0
-    assert "1 segments share no face: 1" in capsys.readouterr().out
+    assert "1 segment within no common face: 1" in capsys.readouterr().out
 
 
 def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys):

@@ -14,6 +14,7 @@ import signedheat as sh
 
 from ..errors import SignedHeatError, SourceError, printable
 from ..jobs import MOST_THREADS
+from ..words import counted, percent
 from .late_imports import files, inputs, pool, shape_files
 from .late_imports import operands as shapes
 from .options import (
@@ -105,8 +106,8 @@ def batch(arguments: Namespace) -> Summary:
     }
     by_state = ", ".join(f"{number} {state}" for state, number in counts.items())
     before = f" ({done.skipped} of them before)" if done.skipped else ""
-    counted = f"{len(states)} shapes, {by_state}{before}, {pool.duration(seconds)} of work"
-    return summary, f"{printable(str(done.manifest))}: {counted}"
+    total = f"{counted(len(states), 'shape')}, {by_state}{before}, {pool.duration(seconds)} of work"
+    return summary, f"{printable(str(done.manifest))}: {total}"
 
 
 def names_file(output: str) -> bool:
@@ -185,7 +186,9 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
     target = Path(arguments.output)
     n_shapes = len(inputs.expand(listed(arguments.inputs)))
     if n_shapes != 1:
-        arguments.parser.error(f"{n_shapes} shapes do not go into one file: name a folder, such as -o {target.stem}/")
+        arguments.parser.error(
+            f"{counted(n_shapes, 'shape')} do not go into one file: name a folder, such as -o {target.stem}/"
+        )
     sh.io.ensure_writable(target, {target.suffix.lower()}, "a surface")
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
         done = made_of_each(arguments, folder, job)
@@ -209,13 +212,17 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
 def in_words(figures: dict[str, object]) -> str:
     """Describe the figures of a closed mesh in one line."""
     bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
-    bad_edges = f"{figures['bad_edges']} edges that two faces do not share, " if figures["bad_edges"] else ""
+    bad_edges = (
+        f"{counted(int(str(figures['bad_edges'])), 'edge')} that two faces do not share, "
+        if figures["bad_edges"]
+        else ""
+    )
     unit = "" if figures["units"] is None else f" {figures['units']}"
     volume = f"{figures['volume']:.4g}{unit}{'³' if unit else ''}"
-    share = 100 * float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
+    share = float(str(figures["completed_area"])) / max(float(str(figures["area"])), 1e-300)
     return (
         f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {volume}, {figures['faces']} faces, "
-        f"{openings} {'opening' if openings == 1 else 'openings'} completed ({share:.2g} % of the area), "
+        f"{openings} {'opening' if openings == 1 else 'openings'} completed ({percent(share, 2)} of the area), "
         f"{figures['to_faces']:.2g}{unit} from the faces and {figures['from_faces']:.2g}{unit} back at most, "
         f"{bad_edges}{meeting or 'no'} self-intersections; {figures['way']}"
     )

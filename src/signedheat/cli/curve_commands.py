@@ -8,6 +8,7 @@ from typing import Any, Literal
 import signedheat as sh
 
 from ..errors import SourceError, printable
+from ..words import counted, percent
 from .late_imports import curve_completion as closing
 from .late_imports import curve_distance as distance
 from .late_imports import diagnostics, numpy
@@ -129,11 +130,11 @@ def surface(arguments: Namespace) -> Summary:
     if arguments.preview:
         up = "xyz".index(arguments.up)
         sh.view.save_surface(field, arguments.preview, sources, arguments.contours or 20, up)
-    text = f"{printable(arguments.output)}: {len(field.values)} vertices, φ from {low:.4g} to {high:.4g}"
+    text = f"{printable(arguments.output)}: {counted(len(field.values), 'vertex')}, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
         text += f", {summary['unreached']} vertices without any source"
     if summary.get("completed"):
-        text += f", {summary['completed']:.1%} of the curve completed"
+        text += f", {percent(summary['completed'])} of the curve completed"
     text = _with_pieces(field, summary, text)
     angles = None if measured_to is not None else field.diagnostics.note(diagnostics.LargeAngles)
     return summary, text + (f"; {angles}: --intrinsic is more accurate" if angles else "")

@@ -30,6 +30,7 @@ from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, completed
 from ..solids.heat_surfaces import Heat
 from ..tets.tet_discretization import memory_estimate
+from ..words import counted, percent
 from .options import IMAGES, METHOD, REPAIR, is_given, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
@@ -239,8 +240,8 @@ def hint(field: sh.GridField) -> str:
     if cancelled < CANCELLED_AREA:
         return ""
     return (
-        f"\n{cancelled:.4%} of the area lies within a cell of area that faces the other way, as on thin sheets: if "
-        "faces are doubled, remove one copy"
+        f"\n{percent(cancelled)} of the area lies within a cell of area that faces the other way, as on thin sheets: "
+        "if faces are doubled, remove one copy"
     )
 
 
@@ -263,7 +264,7 @@ def on_tets(arguments: Namespace) -> tuple[Any, sh.TetField]:
             mesh = sh.tetrahedralize(shape, resolution=resolution, padding=arguments.padding)
             n = mesh.n_tets
             refuse_beyond_memory(  # the number of tets grows at least with the square of the resolution
-                f"distance on {n:,} tets",
+                f"distance on {counted(n, 'tet')}",
                 n,
                 memory_estimate,
                 lambda fits: f"lower the resolution from {resolution} to {int(resolution * math.sqrt(fits / n))}",

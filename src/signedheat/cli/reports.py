@@ -28,6 +28,7 @@ from ..solids.mesh_orientation import Orientation
 from ..solids.thickness import Widths
 from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_DENSE_NODE
 from ..surfaces.source_segments import segments_of
+from ..words import counted, percent
 from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
 
@@ -150,7 +151,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
     )
     said = [f"{_count(number, name)} {what}" for number, name, what in mended if number]
     if found.undecided_area > 1 - WHOLE_AREA:
-        said.append(f"{100 * found.undecided_area:.3g} % of the area bounds nothing")
+        said.append(f"{percent(found.undecided_area)} of the area bounds nothing")
     if not said:
         return "whole: closed and oriented; distance to it is exact"
     return f"broken: {', '.join(said)}; every command takes it as it is"
@@ -166,10 +167,10 @@ def verdict_of_solid(solid: sh.Solid) -> str:
     'a solid: closed, 10.2 % of its area completed; distance to it is exact'
     """
     areas = face_areas(solid.triangles)
-    made, sheets = (100 * areas[chosen].sum() / areas.sum() for chosen in (solid.origins < 0, ~solid.bounding))
+    made, sheets = (areas[chosen].sum() / areas.sum() for chosen in (solid.origins < 0, ~solid.bounding))
     said = ["closed" if solid.bounding.any() else "sheets that bound nothing"]
-    said += [f"{made:.3g} % of its area completed"] if made else []
-    said += [f"{sheets:.3g} % of it sheets"] if sheets and solid.bounding.any() else []
+    said += [f"{percent(made)} of its area completed"] if made else []
+    said += [f"{percent(sheets)} of it sheets"] if sheets and solid.bounding.any() else []
     return f"a solid: {', '.join(said)}; distance to it is exact"
 
 
@@ -186,10 +187,10 @@ def orientation_text(found: Orientation) -> str:
     said = [f"{_count(found.n_parts, 'part')}, {closed}"]
     if found.inconsistent_edges:
         edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
-        said.append(f"faces disagree at {edges}: {faces} to turn ({100 * found.turned_area:.3g} % of the area)")
+        said.append(f"faces disagree at {edges}: {faces} to turn ({percent(found.turned_area)} of the area)")
     elif found.turned_parts:
         which = "all" if found.turned_area > WHOLE_AREA else f"{_count(found.turned_parts, 'part')}"
-        said.append(f"{which} facing inwards ({100 * found.turned_area:.3g} % of the area to turn)")
+        said.append(f"{which} facing inwards ({percent(found.turned_area)} of the area to turn)")
     elif found.undecided_area < WHOLE_AREA:
         said.append("facing outwards")
     kinds = (
@@ -202,7 +203,7 @@ def orientation_text(found: Orientation) -> str:
         said.append(f"{_count(found.merged_faces, 'duplicate face')} to merge")
     if found.undecided_parts:
         sheets = _count(found.undecided_parts, "sheet")
-        said.append(f"{100 * found.undecided_area:.3g} % of the area in {sheets} without an inside")
+        said.append(f"{percent(found.undecided_area)} of the area in {sheets} without an inside")
     return "; ".join(said)
 
 
@@ -252,7 +253,7 @@ def curves_text(rows: Sequence[dict[str, Any]]) -> str:
             line += f"; pieces: {row['along_edges']} along edges, {row['inside_faces']} in faces"
             apart, ends = row["share_no_face"], row["open_ends"]
             if apart:
-                line += f"; {len(apart)} segments share no face: {_shortened(apart)}"
+                line += f"; {counted(len(apart), 'segment')} within no common face: {_shortened(apart)}"
             line += f"; open at {_shortened(ends)}" if ends else "; closed"
             if row["junctions"]:
                 line += f"; {row['junctions']} junctions"

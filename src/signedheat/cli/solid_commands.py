@@ -13,6 +13,7 @@ import signedheat as sh
 
 from ..errors import printable
 from ..packages import require
+from ..words import Sentence, counted, percent
 from .late_imports import operands as shapes
 from .options import (
     COMPLETION_STEPS,
@@ -99,7 +100,7 @@ def volume(arguments: Namespace) -> Summary:
     summary["units"] = unit
     nodes = " × ".join(map(str, field.grid.shape))
     within = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
-    text = f"{printable(arguments.output)}: {nodes} nodes{within}, {shapes.range_in_words(summary, unit)}"
+    text = f"{printable(arguments.output)}: {counted(nodes, 'node')}{within}, {shapes.range_in_words(summary, unit)}"
     return summary, text + shapes.hint(field)
 
 
@@ -114,7 +115,7 @@ def _on_tets(arguments: Namespace) -> Summary:
     n_tets, unit = field.mesh.n_tets, shapes.unit_in_use(arguments, arguments.shape)
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), "n_tets": n_tets}
     summary["units"] = unit
-    return summary, f"{printable(arguments.output)}: {n_tets} tets, {shapes.range_in_words(summary, unit)}"
+    return summary, f"{printable(arguments.output)}: {counted(n_tets, 'tet')}, {shapes.range_in_words(summary, unit)}"
 
 
 def check_offset(arguments: Namespace) -> None:
@@ -163,9 +164,11 @@ def offset(arguments: Namespace) -> Summary:
         for distance, path, what in zip(arguments.distances, outputs, surfaces, strict=True)
     ]
     unit = shapes.unit_in_use(arguments, arguments.shape)
-    kind = f"{{lines}} lines ({{closed}} closed), length {{length:.6g}}{shapes.named(unit)}"
+    kind = f"{{lines:line}} ({{closed}} closed), length {{length:.6g}}{shapes.named(unit)}"
     kind = kind if planar else "closed surface, {faces} faces"
-    text = "\n".join(f"{w['output']}: at {w['distance']:+g}{shapes.named(unit)}, {kind.format(**w)}" for w in written)
+    text = "\n".join(
+        f"{w['output']}: at {w['distance']:+g}{shapes.named(unit)}, {Sentence().format(kind, **w)}" for w in written
+    )
     summary = {
         "units": unit,
         "input": arguments.shape,
@@ -351,7 +354,7 @@ def sample(arguments: Namespace) -> Summary:
     figures = samples.figures
     summary = {"input": arguments.shape, "output": arguments.output, **figures}
     inside = figures["inside_share"]
-    counts = f"{len(samples.points)} points, {figures['near']} near the surface, {inside:.1%} inside"
+    counts = f"{counted(len(samples.points), 'point')}, {figures['near']} near the surface, {percent(inside)} inside"
     return summary, f"{printable(arguments.output)}: {counts}"
 
 

@@ -16,6 +16,7 @@ import signedheat as sh
 
 from ..errors import FileFormatError, MissingPackageError, SignedHeatError, printable
 from ..jobs import run_limited
+from ..words import counted, percent
 from .late_imports import inputs, inspection, reports, samples, windows
 from .late_imports import operands as shapes
 from .options import (
@@ -244,13 +245,13 @@ def deviation(arguments: Namespace) -> Summary:
     summary: dict[str, Any] = {"scan": arguments.scan, "nominal": arguments.nominal, **deviations.figures}
     summary |= {"units": unit, "within": {f"{t:g}": deviations.within(t) for t in arguments.tolerance}, "worst": worst}
     lines = [
-        f"{printable(arguments.scan)}: {len(deviations.of_surface)} points, 98 % of them {low:.4g} to {high:.4g}"
-        f"{shapes.named(unit)} off {printable(arguments.nominal)}, median {median:.4g}, "
+        f"{printable(arguments.scan)}: {counted(len(deviations.of_surface), 'point')}, 98 % of them "
+        f"{low:.4g} to {high:.4g}{shapes.named(unit)} off {printable(arguments.nominal)}, median {median:.4g}, "
         f"root mean square {deviations.rms:.4g}"
     ]
     if deviations.beyond_rim.any():
-        lines[0] += f"; {summary['beyond_rim']:.2%} beyond its rim"
-    lines += [f"within ±{t}{shapes.named(unit)}: {share:.2%}" for t, share in summary["within"].items()]
+        lines[0] += f"; {percent(summary['beyond_rim'])} beyond its rim"
+    lines += [f"within ±{t}{shapes.named(unit)}: {percent(share)}" for t, share in summary["within"].items()]
     lines += [f"{row['deviation']:+.4g}{shapes.named(unit)} at {shapes.place(row['at'])}" for row in worst]
     for output in arguments.output:
         deviations.save(output)
@@ -287,7 +288,7 @@ def thickness(arguments: Namespace) -> Summary:
     text += f"90 % of the area {low:.4g} to {high:.4g}, median {median:.4g}"
     if arguments.least is not None:
         summary["below"] = thicknesses.below(arguments.least)
-        text += f"; {summary['below']:.2%} thinner than {arguments.least:g}"
+        text += f"; {percent(summary['below'])} thinner than {arguments.least:g}"
     for output in arguments.output:
         thicknesses.save(output)
     return summary, "\n".join([text, *map(printable, arguments.output)])

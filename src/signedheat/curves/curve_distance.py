@@ -30,6 +30,7 @@ from ..surfaces.surface_discretization import vertices_joined
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
+from ..words import percent
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, with_turned
 
@@ -308,7 +309,7 @@ def reason_for_doubt(
     apart = areas[(np.sign(field.values) != sides) & ~near & ~np.isnan(field.values)].sum() / areas.sum()
     if apart > UNTRUSTWORTHY:
         return (
-            f"the gaps of the curves are so wide that completing them in two ways differs on {apart:.0%} of the "
+            f"the gaps of the curves are so wide that completing them in two ways differs on {percent(apart)} of the "
             "surface. Draw more of them"
         )
     return ""

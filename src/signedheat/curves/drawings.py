@@ -108,7 +108,7 @@ class OutlinesFilled(Note):
     outlines: int
     length_inside: float
     text: ClassVar[str] = (
-        "closed outlines: {0.outlines}, filled by the rule {0.rule}; {0.length_inside:.2%} of their length lies inside"
+        "closed outlines: {0.outlines}, filled by the rule {0.rule}; {0.length_inside:%} of their length lies inside"
     )
 
     @property

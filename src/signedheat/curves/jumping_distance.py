@@ -35,6 +35,7 @@ from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization, lowered_mesh, lowered_polygons
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag, positive_number
+from ..words import counted
 from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_continuous, minimize, smoothed
 from .piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 
@@ -163,7 +164,7 @@ def piecewise_distance(
         error = integration_error(phi, directions)
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
-        warn_user(f"{len(unreached)} faces are connected to no source: NaN there", UnreachedWarning)
+        warn_user(f"{counted(len(unreached), 'face')} are connected to no source: NaN there", UnreachedWarning)
     if error > ROUGH_INTEGRATION:
         warn_user(
             f"slopes of φ are off by {error:.3g} on average: on triangles so large or thin neither they nor cuts mean "

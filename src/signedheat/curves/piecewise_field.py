@@ -26,6 +26,7 @@ from ..surfaces.subdivision import positions, subdivided
 from ..surfaces.surface_curves import Curve, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
+from ..words import counted
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -65,7 +66,7 @@ class Cut(Frozen):
         return float(np.average(self.jumps.mean(axis=1), weights=self.steps))
 
     def __repr__(self) -> str:
-        return f"Cut({len(self.vertices)} vertices, length {self.length:.4g}, mean jump {self.height:.4g})"
+        return f"Cut({counted(len(self.vertices), 'vertex')}, length {self.length:.4g}, mean jump {self.height:.4g})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -270,7 +271,7 @@ class PiecewiseField(Displayed, Arithmetic, Frozen):
 
     def __repr__(self) -> str:
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
-        return f"PiecewiseField({self.domain!r}, values from {low:.4g} to {high:.4g}, {len(self.cut)} cuts)"
+        return f"PiecewiseField({self.domain!r}, values from {low:.4g} to {high:.4g}, {counted(len(self.cut), 'cut')})"
 
 
 class IntrinsicPiecewiseField(PiecewiseField):

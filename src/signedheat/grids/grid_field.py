@@ -25,6 +25,7 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import contiguous, finite_number, query_points, shaped
+from ..words import counted
 from .blocks import BLOCK, Blocks, BlockValues
 from .grid import Dimension, Grid
 from .marching import Part, closed_surface, contour_parts, level_lines, values_at_walls
@@ -569,7 +570,7 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def __repr__(self) -> str:
         how = "interpolated" if self.solid is None else "exact"
         if self.blocks is not None:
-            band = f"{len(self.blocks)} blocks, {self.width:g} on either side"
+            band = f"{counted(len(self.blocks), 'block')}, {self.width:g} on either side"
             return f"GridField({how} between nodes, {self.grid!r}, {band})"
         low, high = (float(f.reduce(self.values, axis=None)) for f in (np.fmin, np.fmax))
         return f"GridField({how} between nodes, {self.grid!r}, values from {low:.4g} to {high:.4g})"

@@ -14,6 +14,7 @@ from ..errors import GeometryError
 from ..exchange import Displayed
 from ..packages import lazy_module
 from ..validation import boolean, coordinates, flag, numbers, positive_steps
+from ..words import counted
 from .marching import level_lines
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ class Polyline(Displayed, Frozen):
             raise GeometryError(f"a polyline needs at least 2 points, not {len(positions)}", element="points")
         if (positions == positions[0]).all():
             raise GeometryError(
-                f"the polyline has no length: its {len(positions)} points are the same", element="points"
+                f"the polyline has no length: its {counted(len(positions), 'point')} are the same", element="points"
             )
         vars(self).update(points=positions, closed=closed)
 
@@ -163,4 +164,4 @@ class Polyline(Displayed, Frozen):
         return pyvista.lines_from_points(points, close=self.closed)
 
     def __repr__(self) -> str:
-        return f"Polyline({self.n_points} points, {'closed' if self.closed else 'open'})"
+        return f"Polyline({counted(self.n_points, 'point')}, {'closed' if self.closed else 'open'})"

@@ -90,6 +90,10 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
         raise GeometryError(f"values must have one to four axes, and two nodes, not {given.shape}", element="values")
     if read.dtype == np.bool_:
         raise GeometryError("booleans have no sign", remedy="pass numpy.where(inside, -1.0, 1.0)", element="values")
+    if read.dtype.kind == "u":
+        raise GeometryError(
+            f"values of {read.dtype} have no sign", remedy="pass numpy.where(values > 0, -1.0, 1.0)", element="values"
+        )
     flags = [periodic] * given.ndim if np.ndim(periodic) == 0 else list(periodic)  # type: ignore[arg-type]
     if len(flags) != given.ndim:
         raise GeometryError(
@@ -115,6 +119,8 @@ def _(field: GridField, source: object, method: Method | None, progress: Progres
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
         )
     if field.solid is not None:
+        if progress is not None:
+            progress(1.0, "done")
         return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
     if field.blocks is not None:
         raise GeometryError("a field in a band cannot be sharpened", remedy="use its dense()", element="field")

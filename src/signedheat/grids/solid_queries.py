@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Ints
+from ..words import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +56,7 @@ class Closest:
         return self.faces < 0
 
     def __repr__(self) -> str:
-        return f"Closest({np.size(self.faces)} points, {np.count_nonzero(self.completed)} on the completion)"
+        return f"Closest({counted(np.size(self.faces), 'point')}, {np.count_nonzero(self.completed)} on the completion)"
 
 
 class SolidQueries(Protocol):

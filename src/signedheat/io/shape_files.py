@@ -129,7 +129,7 @@ def read(path: PathLike) -> Shape | Solid:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).save(f"{folder}/one.ply")
     ...     sh.read(f"{folder}/one.ply")
-    TriangleMesh(3 vertices, 1 faces)
+    TriangleMesh(3 vertices, 1 face)
     """
     if extension(path) in POLYLINE_FORMATS:
         raise FileFormatError(

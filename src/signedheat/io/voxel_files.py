@@ -102,6 +102,12 @@ class LabelImage(Represented, Frozen):
                 remedy="resample the image along right angles",
                 element="axes",
             )
+        if self.space is not None and not isinstance(self.space, str):
+            raise GeometryError(
+                f"the space of an image is named by words, not {self.space!r:.50}",
+                remedy='pass for instance space="left-posterior-superior"',
+                element="space",
+            )
         for name, array in (("labels", labels), ("axes", axes), ("origin", origin)):
             object.__setattr__(self, name, read_only(array))
 

@@ -43,6 +43,7 @@ from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
 from ..parallel import in_threads
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..words import percent
 from .gauss import Pieces, sampled
 from .offsets import Offset
 from .tiles import blocks_where, prepared, solved, tiles_of
@@ -392,7 +393,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
     gone = n_parts - len(np.unique(parts[~lost]))
     if gone == 0 and lost.sum() <= SMALL_SHARE * len(lost):  # most parts have edges and tips thinner than a cell
         return
-    missing = f"{gone} of {n_parts} parts" if gone else f"{lost.mean():.0%} of the surface"
+    missing = f"{gone} of {n_parts} parts" if gone else f"{percent(lost.mean())} of the surface"
     remedy = "make the cells smaller, or keep the faces" if offset.level == 0 else "make the cells smaller"
     warn_user(f"cells of {grid.spacing.max():.3g} are too large for {missing}, lost here: {remedy}", InexactWarning)
 

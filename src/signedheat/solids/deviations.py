@@ -25,6 +25,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..transforms import joined_shape
 from ..validation import finite_number, percentages
+from ..words import counted
 from .completion import complete
 from .mesh_orientation import agreeing_faces, owners_of
 from .solid import Solid
@@ -252,7 +253,7 @@ class Deviation(Frozen):
 
     def __repr__(self) -> str:
         low, median, high = self.percentiles((1, 50, 99))
-        return f"Deviation({len(self.of_surface)} points, {low:.3g} to {high:.3g}, median {median:.3g})"
+        return f"Deviation({counted(len(self.of_surface), 'point')}, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
 @public_call

@@ -19,6 +19,7 @@ from ..grids.marching import CAP, closed_surface
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import array_of, finite_number, flag, positive_steps, refuse_beside, whole_number
+from ..words import counted
 from .contouring import crossed_between, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
@@ -252,7 +253,7 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
         numbers = np.asarray(f(asked), dtype=np.float64)
         if numbers.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
             raise SignedHeatError(
-                f"the function returns shape {numbers.shape} for {len(asked)} points",
+                f"the function returns shape {numbers.shape} for {counted(len(asked), 'point')}",
                 element="f",
                 remedy="return one number for each of (n, 3) points, or three numbers for a gradient",
             )

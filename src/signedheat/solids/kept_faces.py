@@ -23,6 +23,7 @@ from ..mesh.unit_vectors import angles_around
 from ..mesh.welding import coincident_faces, indexed, tolerances
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..words import counted
 from .regions import cut_and_sided, widest
 from .tiles import Evaluated
 from .winding import Windings
@@ -114,7 +115,7 @@ def _without_doubles(faces: Ints) -> Ints:
 def unjoined(places: Floats) -> str:
     """Say where a contour was taken, for messages."""
     x, y, z = places[0]
-    around = "one place" if len(places) == 1 else f"{len(places)} places, the first"
+    around = "one place" if len(places) == 1 else f"{counted(len(places), 'place')}, the first"
     return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
 
 

@@ -23,6 +23,7 @@ from ..parallel import in_chunks
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..words import counted
 from .mesh_orientation import agreeing_faces
 from .tiles import Evaluated
 
@@ -133,7 +134,7 @@ def checked_reach(reach: Reach) -> Reach:
         values = np.asarray(reach(places), dtype=np.float64)
         if values.shape != (len(places),) or not np.isfinite(values).all():
             raise SignedHeatError(
-                f"the distance has shape {values.shape} at {len(places)} places, or is not finite",
+                f"the distance has shape {values.shape} at {counted(len(places), 'place')}, or is not finite",
                 remedy="return a finite number for each of (n, 3) places",
                 element="distance",
             )

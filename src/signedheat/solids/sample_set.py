@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from ..arrays import Bools, Floats
 from ..packages import lazy_module
+from ..words import counted
 
 files: Any = lazy_module("signedheat.io.shape_files", "files")
 
@@ -124,5 +125,5 @@ class Samples:
 
     def __repr__(self) -> str:
         low, high = self.distances.min(), self.distances.max()
-        count = f"{len(self.points)} points, {int(self.near.sum())} near the surface"
+        count = f"{counted(len(self.points), 'point')}, {int(self.near.sum())} near the surface"
         return f"Samples({count}, distances from {low:.3g} to {high:.3g})"

@@ -31,6 +31,7 @@ from ..search.nearest_triangles import weights_in
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transformed
 from ..validation import finite_number, flag, positive_number, query_points, refuse_beside, shaped
+from ..words import counted, percent
 from .contouring import announce_lost, sharp_surface
 from .kept_faces import given_surface, unjoined
 from .offsets import Offset, Reach
@@ -582,7 +583,7 @@ class Solid(Displayed, Represented, Frozen):
         share = float(areas[made].sum() / max(float(areas.sum()), np.finfo(float).tiny))
         notes = "; ".join(str(note) for note in self.diagnostics.important)
         return (
-            f"Solid({len(self.triangles)} triangles, {share:.1%} of their area completed,\n"
+            f"Solid({counted(len(self.triangles), 'triangle')}, {percent(share)} of their area completed,\n"
             f"      box from ({low}) to ({high}),\n"
             f"      {notes or 'as it was given'})"
         )

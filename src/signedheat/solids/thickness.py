@@ -35,6 +35,7 @@ from ..search.nearest_triangles import foot_on_triangle, weights_in
 from ..surfaces.local_triangulations import OPPOSITE_SIDES
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import percentages, positive_number, whole_number
+from ..words import counted
 from .completion import complete
 from .mesh_orientation import Mesh
 from .sampling import evenly_on
@@ -191,9 +192,9 @@ class Thickness(Frozen):
 
     def __repr__(self) -> str:
         if np.isnan(self.values).all():
-            return f"Thickness({len(self.values)} faces, none opposite another)"
+            return f"Thickness({counted(len(self.values), 'face')}, none opposite another)"
         low, median, high = self.percentiles([0, 50, 100])
-        return f"Thickness({len(self.values)} faces, {low:.3g} to {high:.3g}, median {median:.3g})"
+        return f"Thickness({counted(len(self.values), 'face')}, {low:.3g} to {high:.3g}, median {median:.3g})"
 
 
 @public_call

@@ -13,6 +13,7 @@ from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
 from ..search.face_tree import NearestFaces
 from ..search.winding_tree import OFF_FACE, WindingTree, steps_off, winding_sums
+from ..words import counted
 
 INSIDE_WINDING = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""
@@ -35,7 +36,7 @@ class Windings(Frozen):
         if len(ends):
             x, y, z = ends[0].mean(axis=0)
             raise GeometryError(
-                f"the boundary of the solid is not closed: {len(ends)} edges lack a face, the first around "
+                f"the boundary of the solid is not closed: {counted(len(ends), 'edge')} lack a face, the first around "
                 f"({x:.4g}, {y:.4g}, {z:.4g})",
                 remedy="use `complete` to make solids",
                 element="triangles",

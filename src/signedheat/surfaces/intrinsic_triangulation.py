@@ -29,6 +29,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
 from ..validation import finite_rows, flag, frozen, whole_numbers
+from ..words import counted
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
@@ -365,7 +366,8 @@ class IntrinsicTriangulation(Displayed, Frozen):
         return self.mesh.to_pyvista()
 
     def __repr__(self) -> str:
-        return f"IntrinsicTriangulation({self.n_vertices} vertices, {self.n_faces} faces: {self.summary})"
+        size = f"{counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')}"
+        return f"IntrinsicTriangulation({size}: {self.summary})"
 
 
 @public_call

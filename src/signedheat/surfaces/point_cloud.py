@@ -27,6 +27,7 @@ from ..mesh.signed_graph import Links, signs_of
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import same_rows
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
+from ..words import counted, percent
 from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, opposed_normals
 from .plane_fits import (
     CLEAN_NEIGHBORS,
@@ -191,7 +192,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         against = 0.0 if given is None else float(((normals * given).sum(axis=1) < 0).mean())
         if min(against, 1 - against) > CONTRARY_NORMALS:
             warn_user(
-                f"{against:.0%} of the normals contradict the sides that the points show, as on plates "
+                f"{percent(against)} of the normals contradict the sides that the points show, as on plates "
                 "thinner than half of the distance between points",
                 InexactWarning,
             )
@@ -228,7 +229,8 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return np.where(exists, self.representatives[np.where(exists, vertices, 0)], vertices)
 
     def __repr__(self) -> str:
-        return f"PointCloud({self.n_points} points, {'with' if self.normals is not None else 'without'} normals)"
+        normals = "without normals" if self.normals is None else "with normals"
+        return f"PointCloud({counted(self.n_points, 'point')}, {normals})"
 
 
 def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
@@ -245,7 +247,7 @@ def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
 
 def _same_length(values: Floats, points: Floats, name: str) -> None:
     if len(values) != len(points):
-        raise GeometryError(f"there are {len(points)} points, but {len(values)} {name}", element=name)
+        raise GeometryError(f"there are {counted(len(points), 'point')}, but {len(values)} {name}", element=name)
 
 
 KEPT_SPACING = 0.35

@@ -23,6 +23,7 @@ from ..exchange import Elements, Exchangeable
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.triangles import area_vectors, cut_into_ears
 from ..validation import array_of, coordinates, from_zero, frozen, used_bounds, whole_numbers
+from ..words import counted
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 
@@ -182,7 +183,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         return face_mask[self.refinement.face_polygons]
 
     def __repr__(self) -> str:
-        return f"PolygonMesh({self.n_vertices} vertices, {self.n_polygons} polygons)"
+        return f"PolygonMesh({counted(self.n_vertices, 'vertex')}, {counted(self.n_polygons, 'polygon')})"
 
 
 _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over

@@ -233,7 +233,7 @@ class Surface(Frozen):
         --------
         >>> import signedheat as sh
         >>> sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]).points_at(2)
-        SurfacePoints(1 points)
+        SurfacePoints(1 point)
         """
         return SurfacePoints(*self._at_vertices(vertices, "point"))
 

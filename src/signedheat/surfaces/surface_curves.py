@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Frozen, Ints
 from ..errors import SourceError
 from ..validation import array_of, finite_rows, flag, frozen, whole_numbers
+from ..words import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +124,7 @@ class Curve(Frozen):
 
     def __repr__(self) -> str:
         kind = ("closed" if self.closed else "open", "oriented" if self.oriented else "unoriented")
-        return f"Curve({self.n_points} points, {kind[0]}, {kind[1]})"
+        return f"Curve({counted(self.n_points, 'point')}, {kind[0]}, {kind[1]})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +151,7 @@ class SurfacePoints(Frozen):
     Examples
     --------
     >>> SurfacePoints([4], [[0.2, 0.3, 0.5]])
-    SurfacePoints(1 points)
+    SurfacePoints(1 point)
     """
 
     faces: Ints
@@ -168,7 +169,7 @@ class SurfacePoints(Frozen):
         return len(self.faces)
 
     def __repr__(self) -> str:
-        return f"SurfacePoints({self.n_points} points)"
+        return f"SurfacePoints({counted(self.n_points, 'point')})"
 
 
 CurveOrPoints: TypeAlias = Curve | SurfacePoints

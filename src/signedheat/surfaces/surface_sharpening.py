@@ -26,6 +26,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, VERTEX, incident_faces
 from ..search.face_tree import EQUALLY_NEAR
 from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
+from ..words import percent
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .source_segments import given_curves
 from .surface_curves import CurvesAndPoints
@@ -163,7 +164,7 @@ def nearest_curve(
     decided = (bounded & reached).sum() / max(reached.sum(), 1)
     if share > (INVENTED if decided > UNDECIDED else INVENTED_IF_UNDECIDED) and not note.free_ends:
         warn_user(
-            f"curves without free ends bound no region: {100 * share:.2g} % of what distance is measured to is "
+            f"curves without free ends bound no region: {percent(share)} of what distance is measured to is "
             "where its sign must change elsewhere. piecewise_distance lets it jump there",
             InexactWarning,
         )

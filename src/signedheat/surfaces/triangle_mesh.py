@@ -18,6 +18,7 @@ from ..mesh.triangles import area_vectors, part_volumes
 from ..mesh.welding import SEAM_UNITS, joined_rims
 from ..search.nearest_triangles import TriangleTree
 from ..validation import coordinates, element_ids, used_bounds
+from ..words import counted
 from .surface import Surface
 
 if TYPE_CHECKING:
@@ -164,4 +165,4 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         return self
 
     def __repr__(self) -> str:
-        return f"TriangleMesh({self.n_vertices} vertices, {self.n_faces} faces)"
+        return f"TriangleMesh({counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')})"

@@ -19,6 +19,7 @@ from ..mesh.tet_shapes import FaceTable, Tetrahedra, signed_volumes
 from ..packages import lazy_module
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import coordinates, element_ids, frozen, used_bounds
+from ..words import counted
 
 if TYPE_CHECKING:
     import meshio
@@ -75,7 +76,7 @@ class TetMesh(Displayed, Frozen):
         volumes = signed_volumes(positions, ids)
         if not volumes.any():
             raise GeometryError(
-                f"none of the {len(ids)} tets has any volume: the vertices lie in one plane or point",
+                f"none of the {counted(len(ids), 'tet')} has any volume: the vertices lie in one plane or point",
                 element="vertices",
             )
         inside_out = np.flatnonzero(volumes < 0)
@@ -238,4 +239,4 @@ class TetMesh(Displayed, Frozen):
         return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
     def __repr__(self) -> str:
-        return f"TetMesh({self.n_vertices} vertices, {self.n_tets} tets)"
+        return f"TetMesh({counted(self.n_vertices, 'vertex')}, {counted(self.n_tets, 'tet')})"
