@@ -100,7 +100,7 @@ def volume(arguments: Namespace) -> Summary:
     summary["units"] = unit
     nodes = " × ".join(map(str, field.grid.shape))
     within = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
-    text = f"{printable(arguments.output)}: {counted(nodes, 'node')}{within}, {shapes.range_in_words(summary, unit)}"
+    text = f"{printable(arguments.output)}: {nodes} nodes{within}, {shapes.range_in_words(summary, unit)}"
     return summary, text + shapes.hint(field)
 
 
@@ -354,7 +354,7 @@ def sample(arguments: Namespace) -> Summary:
     figures = samples.figures
     summary = {"input": arguments.shape, "output": arguments.output, **figures}
     inside = figures["inside_share"]
-    counts = f"{counted(len(samples.points), 'point')}, {figures['near']} near the surface, {percent(inside)} inside"
+    counts = f"{counted(len(samples.points), 'point')}, {figures['near']} near the surface, {percent(float(str(inside)))} inside"
     return summary, f"{printable(arguments.output)}: {counts}"
 
 
