@@ -72,7 +72,8 @@ def test_errors_are_those_of_the_command(command):
 
 
 def test_the_version_is_that_of_the_package():
-    assert f'version = "{sh.__version__}"' in (ROOT / "signedheat_blender/blender_manifest.toml").read_text()
+    version = sh.__version__.replace("rc", "-rc.")  # as semantic versions are written
+    assert f'version = "{version}"' in (ROOT / "signedheat_blender/blender_manifest.toml").read_text()
 
 
 def test_operators(command, monkeypatch):

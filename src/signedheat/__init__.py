@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .public import *  # noqa: F403
     from .public import __all__ as __all__
 
-__version__ = "0.2.0"
+__version__ = "1.0.0rc1"
 
 
 def __getattr__(name: str) -> Any:

@@ -353,8 +353,8 @@ def sample(arguments: Namespace) -> Summary:
     (samples.normalized() if arguments.normalize else samples).save(arguments.output, arguments.layout)
     figures = samples.figures
     summary = {"input": arguments.shape, "output": arguments.output, **figures}
-    inside = figures["inside_share"]
-    counts = f"{counted(len(samples.points), 'point')}, {figures['near']} near the surface, {percent(float(str(inside)))} inside"
+    inside = float(str(figures["inside_share"]))
+    counts = f"{counted(len(samples.points), 'point')}, {figures['near']} near the surface, {percent(inside)} inside"
     return summary, f"{printable(arguments.output)}: {counts}"
 
 

@@ -1,0 +1,76 @@
+"""The wheel and the source distribution: what is in them, and that the first lines of the README run after them."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import signedheat as sh
+
+pytest.importorskip("hatchling")
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The folder with a wheel and a source distribution, as `make dist` builds them."""
+    folder = tmp_path_factory.mktemp("dist")
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", str(folder)], cwd=ROOT, check=True)
+    return folder
+
+
+def test_the_wheel_has_the_package_and_nothing_else(built):
+    [wheel] = built.glob("*.whl")
+    assert wheel.name.startswith(f"signedheat-{sh.__version__}-py3-none-any")
+    names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    source = ROOT / "src"
+    files = {path.relative_to(source).as_posix() for path in source.glob("signedheat/**/*") if path.is_file()}
+    assert names == {name for name in files if "__pycache__" not in name}
+
+
+def test_the_source_distribution_has_what_the_documents_and_tests_need(built):
+    [archive] = built.glob("*.tar.gz")
+    top = f"signedheat-{sh.__version__}/"
+    with tarfile.open(archive) as packed:
+        names = {name.removeprefix(top) for name in packed.getnames()}
+    wanted = {
+        "README.md",
+        "CHANGELOG.md",
+        "LICENSE",
+        "Makefile",
+        "pyproject.toml",
+        "docs/quickstart.md",
+        "tests/conftest.py",
+    }
+    assert wanted <= names
+    assert not [name for name in names if "__pycache__" in name or name.startswith((".venv", "dist/"))]
+
+
+@pytest.mark.slow  # it asks the package index
+@pytest.mark.parametrize("kind", ["*.whl", "*.tar.gz"], ids=["wheel", "sdist"])
+def test_first_lines_of_the_readme_run_in_a_fresh_environment(built, kind, tmp_path):
+    [package] = built.glob(kind)
+    venv.create(tmp_path / "fresh", with_pip=True)
+    programs = tmp_path / "fresh" / ("Scripts" if sys.platform == "win32" else "bin")
+    away = {"PYTHONPATH", "PYTHONHOME"}
+    environment = {key: value for key, value in os.environ.items() if key not in away}
+    environment["NUMBA_CACHE_DIR"] = str(tmp_path / "kernels")
+
+    def run(*command: str) -> None:
+        subprocess.run([str(programs / command[0]), *command[1:]], cwd=tmp_path, env=environment, check=True)
+
+    run("python", "-m", "pip", "install", "--quiet", "--prefer-binary", str(package))
+    run("python", "-c", "import signedheat as sh; sh.samples.broken_duck().save('broken.stl')")
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    [code, *_] = re.findall(r"```python\n(.*?)```", text, re.S)
+    run("python", "-c", f"{code}\nassert sh.__version__ == {sh.__version__!r} and sh.read('shell.stl').is_watertight")
+    run("signedheat", "info", "broken.stl")
+    assert (tmp_path / "whole.stl").stat().st_size > 1000
