@@ -25,7 +25,7 @@ from_square = sh.signed_distance(sh.io.read_polylines("square.svg"), resolution=
 
 globe = samples.sphere(3)
 Path("coast.csv").write_text(
-    "x,y,z\n.57,-.81,-.1\n.69,-.58,-.42\n.93,.16,-.34\n.91,.33,.26\n\n.93,.16,.34\n.75,-.43,.5\n.5,-.86,.1\n"
+    "x,y,z\n0.57,-0.81,-0.1\n0.69,-0.58,-0.42\n0.93,0.16,-0.34\n0.91,0.33,0.26\n\n0.93,0.16,0.34\n0.75,-0.43,0.5\n0.5,-0.86,0.1\n"
 )
 coast = sh.io.read_curves("coast.csv", globe)
 sh.io.write_curves(sh.close_curves(coast, globe), "whole.json", globe)

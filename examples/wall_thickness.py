@@ -16,7 +16,7 @@ walls.save("walls.ply")
 walls.save("wall_thickness.png")
 
 # %%
-# Median thickness after the duck was hollowed with walls of .1:
+# Median thickness after the duck was hollowed with walls of 0.1:
 hollow = sh.morphology.shell(scan, -0.1, 0.0, resolution=52)
 measured = float(sh.wall_thickness(hollow).percentiles([50])[0])
 print(f"{measured:.4g}")

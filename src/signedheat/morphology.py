@@ -249,7 +249,7 @@ def opening(
     Examples
     --------
     >>> bar = Polyline([[0, 0], [0, 1], [1, 1], [1, 0.5], [4, 0.5], [4, 0]], closed=True)
-    >>> [opened] = opening(bar, 0.3)  # removes what is .5 wide
+    >>> [opened] = opening(bar, 0.3)  # removes what is 0.5 wide
     >>> bool(opened.points[:, 0].max() < 1.1)
     True
     """
@@ -293,7 +293,7 @@ def closing(
     Examples
     --------
     >>> gap = [Polyline([[x, 0], [x, 1], [x + 1, 1], [x + 1, 0]], closed=True) for x in (0, 1.2)]
-    >>> len(gap), len(closing(gap, 0.2))  # joins parts that are .2 apart
+    >>> len(gap), len(closing(gap, 0.2))  # joins parts that are 0.2 apart
     (2, 1)
     """
     return _offsets(shape, distance, (1, -1), domain, resolution, measure)

@@ -39,7 +39,7 @@ from .tets.tet_field import TetField
 from .validation import finite_number, positive_number
 
 ADDED_SLOPE_ERROR = 0.1
-"""Increase of `LinearElements.bounded_slope_error` that sharpening may cause without a warning; .08 on triangles."""
+"""Increase of `LinearElements.bounded_slope_error` that sharpening may cause without a warning; 0.08 on triangles."""
 
 
 @dataclass(frozen=True, eq=False)

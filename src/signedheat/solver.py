@@ -70,7 +70,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles or
         needles would make distance inaccurate, the mesh is refined once, and all sources share it and its factors.
         True: every set of sources gets its own refinement, with edges along the sources, for curves smaller than
-        triangles. On CAD models its error is .3 to .9 times that of "auto", at the cost of a factorisation for every
+        triangles. On CAD models its error is 0.3 to 0.9 times that of "auto", at the cost of a factorisation for every
         set. False: the triangles as they are. For more control, pass the result of `intrinsic_delaunay` as the domain.
 
     Raises

@@ -429,14 +429,14 @@ TILES = group(
 SLICES = option("--preview", metavar="PNG", help="draw the result: in space, three slices")
 SAMPLING = group(
     "samples",
-    option("--near", type=fraction, default=0.8, metavar="S", help="fraction near the surface, from 0 to 1 (.8)"),
+    option("--near", type=fraction, default=0.8, metavar="S", help="fraction near the surface, from 0 to 1 (0.8)"),
     option(
         "--widths",
         type=not_negative,
         nargs="+",
         default=[0.05, 0.0158],
         metavar="W",
-        help="standard deviations of the noise, relative to the radius of the shape, used equally (.05 .0158)",
+        help="standard deviations of the noise, relative to the radius of the shape, used equally (0.05 0.0158)",
     ),
     option("--seed", type=whole_number(0), default=0, metavar="K", help="seed of the random numbers (0)"),
     option("--normalize", action="store_true", help="move and scale the shape into the unit sphere"),

@@ -36,7 +36,7 @@ from .resolution import on_resolving_triangles
 
 FINEST_DRAWING = 1024
 """Largest number of cells along a drawing with which it is completed, however fine the grid is. Three broken drawings
-differ by .010 of their radius between 128 and 512 cells, by .007 between 128 and 256."""
+differ by 0.010 of their radius between 128 and 512 cells, by 0.007 between 128 and 256."""
 STROKE_NODES = 96
 """Number of nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong
 in silence and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""

@@ -38,11 +38,11 @@ speed. Halved and doubled, none of 46 drawings changes."""
 HALF, TURNED = 0.45, 0.34
 """The inside is a guess if more than the first share of some loops is turned, and that makes up the second share of the
 length. Of 600 drawings with turned parts (`benchmarks/strokes.py`, seeds 20000 to 20200) 6 are wrong in silence and 29
-right with a warning; the first at .49 7 and 25, at .4 4 and 37, at .37 4 and 48; the second at .25 3 and 43, at .3 5
-and 31. Above a half, two halves of a circle that contradict each other would be no guess if a dot decides."""
+right with a warning; the first at 0.49 7 and 25, at 0.4 4 and 37, at 0.37 4 and 48; the second at 0.25 3 and 43, at 0.3
+5 and 31. Above a half, two halves of a circle that contradict each other would be no guess if a dot decides."""
 WORTH = 0.5
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At .4, 6 of these 600
-drawings are wrong in silence and 15 right with a warning; halved 8 and 15, at .6 5 and 22."""
+"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At 0.4, 6 of these 600
+drawings are wrong in silence and 15 right with a warning; halved 8 and 15, at 0.6 5 and 22."""
 CHANGED_AREA = 0.05
 """The inside depends on a stroke if this share of the area changes sides without it. Halved, 5 of these 600 drawings
 are wrong in silence and 23 right with a warning; doubled, 9 and 15."""

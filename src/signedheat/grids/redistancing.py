@@ -173,17 +173,17 @@ measure: Any = lazy_module("skimage.measure", "contours")
 
 SIGN_BLUR = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Distances of balls, half spaces and boxes
-24 to 96 nodes wide are best with .7 to 1; more rounds the edges of boxes."""
+24 to 96 nodes wide are best with 0.7 to 1; more rounds the edges of boxes."""
 LEAST_SIGN = 0.3
 """Smoothed signs are between this and twice as much, with which contours cross the middle third of an edge: signs
 contain no more. With the middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
 SMOOTH_CROSSING = 0.05
 """Distance, in cells, from the neighbours' paraboloids up to which a crossing is smooth. Distances of balls of four
-cells' radius are wrong by at most .04 cells, with .1 by .01; those of clipped balls by .07 and .12."""
+cells' radius are wrong by at most 0.04 cells, with 0.1 by 0.01; those of clipped balls by 0.07 and 0.12."""
 
 FLAT_RADIUS = 0.25
 """Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is
-flat. Distances of balls and half spaces 13 to 17 nodes wide are best with .125 to .25, those of boxes with more."""
+flat. Distances of balls and half spaces 13 to 17 nodes wide are best with 0.125 to 0.25, those of boxes with more."""
 
 
 Measured: TypeAlias = Callable[[Ints, Ints, Floats], Floats]

@@ -32,11 +32,11 @@ LEAST_GAIN = 0.02
 """Another reading of a part must explain at least this share of its area more than that as given."""
 COHERENT_LEVELS = 0.7
 """Loose pieces are the remains of a body if the squared mean of their levels over the mean square is at least this.
-Bodies have .81 to 1, however little is left; leaves, cards and strips have .3 to .6, however many there are."""
+Bodies have 0.81 to 1, however little is left; leaves, cards and strips have 0.3 to 0.6, however many there are."""
 CHANCE_LEVEL = 0.42
 """n loose pieces bound nothing if their level times √(n + 1) is below this: the choice of signs alone explains that.
-Two sheets a quarter of their width apart have .38, three sides of a box .2, a side that four others lack .47, and a
-ball that has lost 85 % of its faces .95."""
+Two sheets a quarter of their width apart have 0.38, three sides of a box 0.2, a side that four others lack 0.47, and a
+ball that has lost 85 % of its faces 0.95."""
 PARTLY_INSIDE = 0.25
 """Loose pieces lie along closed ones if the mean winding number of these there is not this near to a whole number."""
 GAP_REACH = 1.5

@@ -31,7 +31,7 @@ from .spanning import Frame, frame_of
 STRIP_WIDTH = 0.25
 """Width of the strip of surface around an opening that is sampled, relative to the opening's width."""
 SMOOTH_COSINE = 0.7
-"""Edges are sharp if the cosine between the normals of their faces is below this. With .75 lids of ducks that were cut
+"""Edges are sharp if the cosine between the normals of their faces is below this. With 0.75 lids of ducks that were cut
 in two bulge farther, by a tenth of what they differ from flat ones."""
 STRIP_SAMPLES = 16
 """Number of samples across the strip around an opening."""

@@ -86,8 +86,8 @@ NOISE_RANGE = (1e-6, 0.75)
 """Range of distances between corners that noise has separated, relative to the square root of their triangle's area."""
 TORN_LEVEL = 0.2
 """Loose pieces are completed by heat below this level, where a fifth to two fifths of a body are left, else by lids,
-which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose .1 % too little and
-heat .3 % too much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
+which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose 0.1 % too little and
+heat 0.3 % too much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
 ZERO_SET_FACES = 0.75
 """Triangles of the zero set of φ are left out within this distance of faces, in cells: they stand for these faces. With
 0.5 distance to balls, tori and ducks without three tenths of their triangles is 5 to 10 % worse."""

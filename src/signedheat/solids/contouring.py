@@ -50,7 +50,7 @@ from .tiles import blocks_where, prepared, solved, tiles_of
 
 CREASE_TANGENT = 0.05
 """Planes count as one if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by a
-hundredth of a cell at most. With .2 creases of 20° are lost; with .01 facets of smooth surfaces become creases."""
+hundredth of a cell at most. With 0.2 creases of 20° are lost; with 0.01 facets of smooth surfaces become creases."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ VERTEX_SPACING = 0.2
 CHORD_ERROR = 0.02
 """Distance from the level, in cells, above which an edge along a crease is divided."""
 DIVISIONS = 6
-"""Number of rounds in which edges are divided: the largest error on a bracket is .08 cells with three, .05 with six."""
+"""Number of rounds in which edges are divided: the largest error on a bracket is 0.08 cells with three, 0.05 with 6."""
 CROSS_REACH = 4.0
 """Distance from new vertices, in cells, within which triangles are checked for intersections."""
 PROBE_OFFSETS = np.array(list(np.ndindex(2, 2, 2))) - 0.5

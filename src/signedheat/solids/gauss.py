@@ -58,7 +58,7 @@ PLACES_TOGETHER = 16
 """Number of places for which dipoles are summed together. Eight take a fifth longer, 32 as long."""
 WEIGHT_TOLERANCE = 0.02
 """Relative residual up to which the weights of dipoles are solved for. With half of it noisy loose faces take a quarter
-longer, and are no better; with .05 a torus with much noise is a quarter worse."""
+longer, and are no better; with 0.05 a torus with much noise is a quarter worse."""
 
 
 @dataclass(frozen=True, eq=False)

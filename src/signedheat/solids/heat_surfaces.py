@@ -139,10 +139,10 @@ HEAT_NODES = (32, 144)
 """Least and most nodes along the longest side."""
 SURE_WINDING = 0.4
 """The winding number, relative to that inside, decides instead of φ where it is nearer to 0 or 1 than this. φ bulges
-towards the corners of the box: of half a cow as points 11 % are wrong (20 % with .25, 32 % without the rule)."""
+towards the corners of the box: of half a cow as points 11 % are wrong (20 % with 0.25, 32 % without the rule)."""
 FRAGMENT_LEVEL = 0.06
-"""A shape with a mean level below this bounds nothing. An eighth of the faces of a ball has .0625, 400 leaves anywhere
-up to .034, 40 on a stem .043."""
+"""A shape with a mean level below this bounds nothing. An eighth of the faces of a ball has 0.0625, 400 leaves anywhere
+up to 0.034, 40 on a stem 0.043."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ EDGE_PLACES = 8
 `ALONG_EDGE`."""
 ALONG_EDGE = 0.1
 """Two edges run along each other within this distance, relative to the longer one. Chords of the same arc are less than
-.05 apart if it has 16 or more."""
+0.05 apart if it has 16 or more."""
 SHARED_PLACES = 3
 """Number of places of one of two edges that lie along the other. Edges that only meet at a corner share fewer."""
 STRAIGHT_RIM = 1e-5

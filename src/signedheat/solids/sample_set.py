@@ -13,7 +13,7 @@ from ..words import counted
 files: Any = lazy_module("signedheat.io.shape_files", "files")
 
 NOISE_WIDTHS = (0.05, 0.0158)
-"""Default widths of the noise, relative to the radius of the shape: variances .0025 and .00025 (Park et al. 2019)."""
+"""Default widths of the noise, relative to the radius of the shape: variances 0.0025 and 0.00025 (Park et al. 2019)."""
 Layout = Literal["arrays", "deepsdf"]
 """Layout of files of samples: an array for each attribute, or ``pos`` and ``neg`` with x, y, z and distance."""
 

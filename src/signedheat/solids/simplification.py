@@ -18,7 +18,7 @@ manifold3d: Any = lazy_module("manifold3d", "simplified surfaces")
 
 TOLERANCE_ATTEMPTS = 8
 """Number of attempts, each with half the tolerance for manifold3d, until its result is acceptable. Of 51 surfaces at
-.02 to .5 cells 48 took seven or fewer. In the others manifold3d removed a spike or a body larger than the tolerance."""
+0.02 to 0.5 cells 48 took seven or fewer. In the others manifold3d removed a spike or a body that was larger."""
 
 
 def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:

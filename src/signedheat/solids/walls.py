@@ -17,11 +17,11 @@ from .spanning import area_vector
 NARROW = 0.3
 """A strip at right angles to the surface closes two rims if its area, relative to that of flat lids on both, is at most
 this; one that continues the surface straight on closes them if its area is less than that of the lids. A bowl of half
-a ball whose wall is a quarter of its radius has .28, a box without its lid, a tenth as thick as it is wide, .32, two
-square sheets a quarter of their width apart .5."""
+a ball whose wall is a quarter of its radius has 0.28, a box without its lid, a tenth as thick as it is wide, 0.32, two
+square sheets a quarter of their width apart 0.5."""
 LARGE_OPENING = 0.1
 """Two rims are the end of a wall if the area of those lids exceeds this share of their parts' area. Otherwise each rim
-is closed by itself: holes two fifths as wide as a hollow ball have .04, a cup .2, a bowl .5."""
+is closed by itself: holes two fifths as wide as a hollow ball have 0.04, a cup 0.2, a bowl 0.5."""
 
 
 @dataclass(frozen=True, eq=False)

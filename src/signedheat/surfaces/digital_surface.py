@@ -183,8 +183,8 @@ class DigitalSurface(Displayed, Surface):
 
 STAYING = 0.003
 """Weight of staying in the middle of a cell: stairs some four voxels long become slopes. Mean error of normals of a
-ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at .01 1.8° to 2.1°, at .001 .8° to 1.3°; of a box along the
-axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
+ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at 0.01 1.8° to 2.1°, at 0.001 0.8° to 1.3°; of a box along
+the axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
 LARGEST_MOVE = 0.49
 """Largest move of a vertex along each axis, in voxels: below a half, so that no two coincide, in single precision
 either."""

@@ -19,8 +19,8 @@ CLEAN_NEIGHBORS = 12
 NOISY_NEIGHBORS = (12, 24, 48, 96, 192)
 """Sizes of neighbourhood for noisy points."""
 CLEAN_DEVIATION = 0.07
-"""Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below .06,
-also on thin sheets and at edges that the points resolve; noise as wide as the neighbourhood has .09 or more."""
+"""Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below 0.06,
+also on thin sheets and at edges that the points resolve; noise as wide as the neighbourhood has 0.09 or more."""
 ANGLE_ERROR = 0.13
 """Largest angle, in radians, by which noise may turn planes, as estimated from their deviation."""
 CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
@@ -29,11 +29,11 @@ NOISY_HEIGHTS = (0.5, 0.5, 0.5)
 """The same over planes that move from a noisy point to where its neighbours are densest."""
 TWO_SIDES = 0.9
 """Mean distance of neighbours from a quadric through them, relative to the root of its mean square, above which they
-are those of two sides: it is .88 to .99 for two sides with even points, .83 to .96 with random ones, but .74 to .86 for
-one noisy side."""
+are those of two sides: it is 0.88 to 0.99 for two sides with even points, 0.83 to 0.96 with random ones, but 0.74 to
+0.86 for one noisy side."""
 MERGED_SHARE = 0.03
-"""Share of points with neighbours on two sides above which there is a warning. Of scans, CAD and tori with up to .4
-spacings of noise at most .014 are such; of plates, bowls, lenses and tubes whose sides are merged .25 to 1."""
+"""Share of points with neighbours on two sides above which there is a warning. Of scans, CAD and tori with up to 0.4
+spacings of noise at most 0.014 are such; of plates, bowls, lenses and tubes whose sides are merged 0.25 to 1."""
 ONE_SIDE = 0.02
 """Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
 STARTS = 5

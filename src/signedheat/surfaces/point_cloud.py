@@ -47,12 +47,12 @@ if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
 
 CONTRARY_NORMALS = 0.35
-"""Share of the given normals, or of their inverses, that may contradict the orientation of the points. It is .39 to .49
-where both sides of a plate are taken for one, and .3 where .3 of the normals are turned."""
+"""Share of the given normals, or of their inverses, that may contradict the orientation of the points. It is 0.39 to
+0.49 where both sides of a plate are taken for one, and 0.3 where 0.3 of the normals are turned."""
 BAD_SEAM = 0.35
 """Number of edges next to another side across which triangles face opposite ways, relative to the root of the number
-of points, above which there is a warning. On scans, CAD and a box with up to .15 spacings of noise it is at most .07,
-where parts of thin plates face the wrong way mostly .41 to .96."""
+of points, above which there is a warning. On scans, CAD and a box with up to 0.15 spacings of noise it is at most 0.07,
+where parts of thin plates face the wrong way mostly 0.41 to 0.96."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +273,7 @@ UPWARD = np.array([0.01, 0.1, 1.0])
 axis. If a component is halved or doubled, planes keep their sides."""
 MUTUALLY_BELOW = 0.98
 """Given normals are kept on thin sheets if, of all near points with opposite normals, the shares below and above the
-other point differ by at least this. On thin sheets the difference is 1, and .9 if a fifth of the normals are turned.
+other point differ by at least this. On thin sheets the difference is 1, and 0.9 if a fifth of the normals are turned.
 """
 LISTED_AT_ONCE = 4096
 """Number of points whose neighbours are listed at once."""
