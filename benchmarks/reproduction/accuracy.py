@@ -161,8 +161,8 @@ def convergence(page: Page) -> None:
     """Twenty bumpy surfaces of irregular triangles, Loop-subdivided four times; the source is a level set, the truth
     exact polyhedral distance. The paper finds order 1 for all methods. At one time t = h² directions keep an error
     h²/t, which does not fall with h; `Extrapolated`, the default, cancels it. (From three times instead of one and its
-    derivatives, the default has .0913 on the finest, as a median; but the mean of all twenty is .1013 instead of .0995,
-    the worst .215, and 15 are worse.) Intrinsic triangulations have no large triangles, which gains most on the
+    derivatives, the default has 0.0913 on the finest, as a median; the mean of all twenty is 0.1013 instead of 0.0995,
+    the worst 0.215, and 15 are worse.) Intrinsic triangulations have no large triangles, which gains most on the
     coarsest. Falls: on how many ε falls at every level. On eleven decimated scans (`python -m benchmarks.convergence
     MESH ...`) the default has orders from 0.60 to 1.06, one time from 0.18 to 0.78.
     """

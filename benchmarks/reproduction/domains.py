@@ -49,7 +49,7 @@ def other_surfaces(page: Page) -> None:
 @figure("23", "Robust domains")
 def robust_domains(page: Page) -> None:
     """Three sheets that meet along a line, a Möbius strip, and a sphere without a quarter of its faces; ε against
-    closed forms in the unbroken domain. On the strip φ jumps once, and Eq. 16 alone has .078 %.
+    closed forms in the unbroken domain. On the strip φ jumps once, and Eq. 16 alone has 0.078 %.
     """
     picture = new_figure(15, 4.6)
     for k, (name, mesh, curve, exact, view) in enumerate((_book(), _moebius(), _sieve())):

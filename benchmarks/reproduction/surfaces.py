@@ -202,7 +202,7 @@ def failing_gracefully(page: Page) -> None:
 @figure("21", "Curves drawn on a surface of higher genus")
 def drawn_on_higher_genus(page: Page) -> None:
     """Strokes around a torus with bumps, with gaps and overlaps, completed to closed curves (`sh.close_curves`).
-    Triangles refined in another order give .11 to .18 h.
+    Triangles refined in another order give 0.11 to 0.18 h.
     """
     mesh = shapes.subdivided(shapes.organic(3, 500, handles=1), 1)
     heights = shapes.height(mesh.vertices, 3)
