@@ -4,7 +4,7 @@
 
 Closed shapes are a ball with bumps. Building is apart from asking. Processor seconds of all threads, for a million
 points at random in a box, within 0.02 of the surface, on a grid in its order, and along a thousand rays; one point
-alone in milliseconds of the clock, the median of 200. Differences are the largest of 100,000 from libigl's distance with
+alone in milliseconds, the median of 200. Differences are the largest of 100,000 from libigl's distance with
 pseudonormals. libigl builds its trees at each call: what a call of one point takes is building. Open3D and pysdf
 compute in single precision, and pysdf looks at the faces around near vertices only. With ``--share 10`` all but ours
 have every tenth run of a thousand points, and their times are multiplied.

@@ -2,7 +2,7 @@
 ====================
 
 A part was printed a little too large and with a dent; it was scanned with holes. How far is it off the nominal part,
-and where? The nominal file is broken too: a tenth of its faces are missing, others are turned.
+and where? The nominal file is broken too: a tenth of its faces are missing, others are flipped.
 """
 
 import numpy as np

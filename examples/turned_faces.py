@@ -1,5 +1,5 @@
-"""Turned faces
-============
+"""Flipped faces
+=============
 
 Half of the faces of a shape look inwards, at random. Winding numbers cancel; orientation is found and mended first.
 """
@@ -16,8 +16,8 @@ turned = sh.orientation(shape).turned_faces
 
 view.save_row(
     [
-        ("half of the faces turned (red)", shape),
-        (f"sh.orient: {turned} turned back", sh.orient(shape)),
+        ("half of the faces flipped (red)", shape),
+        (f"sh.orient: {turned} flipped back", sh.orient(shape)),
         ("as they were given", plain, {"shape": shape, "across": (1,)}),
         ("signed_distance", mended, {"shape": shape, "across": (1,)}),
     ],

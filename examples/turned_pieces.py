@@ -2,7 +2,7 @@
 ===============================
 
 A curve drawn in pieces, every third one in the wrong direction. Which they are is found from where pieces end and
-begin; they are turned, and the curve is completed.
+begin; they are flipped, and the curve is completed.
 """
 
 import numpy as np
@@ -25,8 +25,8 @@ agreeing = sh.signed_distance(sh.orient(drawn, mesh), mesh, as_oriented=True)
 eye = np.array([0.5, -0.6, 0.6])
 view.save_row(
     [
-        ("every third piece turned", given, {"sources": drawn, "view": eye}),
-        (f"{found.turned.sum()} turned back", agreeing, {"sources": found.curves, "view": eye}),
+        ("every third piece flipped", given, {"sources": drawn, "view": eye}),
+        (f"{found.turned.sum()} flipped back", agreeing, {"sources": found.curves, "view": eye}),
     ],
     "turned_pieces.png",
 )

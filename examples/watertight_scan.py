@@ -1,7 +1,7 @@
 """A watertight part from a broken scan
 ====================================
 
-A whole application: a scan with holes, noise and turned faces becomes a closed solid, and says where it had to guess.
+A whole application: a scan with holes, noise and flipped faces becomes a closed solid, and says where it had to guess.
 """
 
 import signedheat as sh
@@ -18,7 +18,7 @@ confidence = sh.GridField(phi.grid, phi.values.clip(max=0.3))
 
 view.save_row(
     [
-        ("in: holes, noise, turned faces", scan, {"view": (40, -58)}),
+        ("in: holes, noise, flipped faces", scan, {"view": (40, -58)}),
         ("signed distance", confidence, {"shape": scan, "across": (2,)}),
         ("out: closed", closed, {"view": (40, -58)}),
     ],

@@ -237,11 +237,11 @@ def broken_curves_on_surfaces(page: Page) -> None:
 
 
 def draw_broken_curves(page: Page) -> None:
-    """The five surfaces, a third of the pieces turned, and what `sh.signed_distance` makes of them."""
+    """The five surfaces, a third of the pieces flipped, and what `sh.signed_distance` makes of them."""
     shown = {}
     for name, (mesh, heights) in broken_curves.meshes().items():
         curve = max(mesh.level_set(heights, 0.0), key=lambda each: each.n_points)
-        options = broken_curves.DAMAGES["30 % turned"]
+        options = broken_curves.DAMAGES["30 % flipped"]
         pieces = broken_curves.damaged(mesh, heights, curve, np.random.default_rng(0), **options)
         shown[name] = sh.signed_distance(pieces, mesh), pieces
     page.draw(row_of_surfaces(shown), width=1500)

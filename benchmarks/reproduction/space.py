@@ -218,7 +218,7 @@ def broken_geometry_on_tets(page: Page) -> None:
     for name, broken in (
         ("8 holes, noise", scanned_duck()),
         ("30 % of the faces missing", samples.without_faces(duck, 0.3)),
-        ("10 % of the faces turned", samples.with_flipped_faces(duck, 0.1)),
+        ("10 % of the faces flipped", samples.with_flipped_faces(duck, 0.1)),
     ):
         mesh = sh.tetrahedralize(broken, resolution=24)
         points = mesh.vertices

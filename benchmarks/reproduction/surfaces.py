@@ -181,7 +181,7 @@ def failing_gracefully(page: Page) -> None:
     for turned in (0.1, 0.3):
         flip = rng.random(len(parts)) < turned
         flip[0] |= not flip.any()
-        cases[f"{flip.sum()} of {len(parts)} pieces turned"] = [
+        cases[f"{flip.sum()} of {len(parts)} pieces flipped"] = [
             sh.Curve(c.faces[::-1], c.barycentric[::-1]) if f else c for c, f in zip(parts, flip, strict=True)
         ]
     picture = new_figure(15, 8)

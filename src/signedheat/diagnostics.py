@@ -171,7 +171,7 @@ class ShapeOriented(Note):
 
     def __str__(self) -> str:
         texts = [
-            (self.turned_faces, f"faces turned: {self.turned_faces}, {percent(self.turned_area)} of the area"),
+            (self.turned_faces, f"faces flipped: {self.turned_faces}, {percent(self.turned_area)} of the area"),
             (self.merged_faces, f"duplicate faces merged: {self.merged_faces}"),
             (self.nonorientable_parts, f"parts that cannot be oriented: {self.nonorientable_parts}"),
             (self.nested_bodies, f"bodies hidden in others: {self.nested_bodies}"),
@@ -183,7 +183,7 @@ class ShapeOriented(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OrientedPoints(Note):
-    """Numbers of the normals of a point cloud that were fitted, and of those that were turned."""
+    """Numbers of the normals of a point cloud that were fitted, and of those that were flipped."""
 
     normals_fitted: int
     normals_turned: int

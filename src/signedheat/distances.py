@@ -150,7 +150,7 @@ def signed_distance(
     """Compute the signed distance to a broken shape, which is exact up to the completion of missing parts.
 
     Shapes in space are completed (`complete`), and distance is measured to the shape and its completion. Closed
-    outlines in the plane are filled. For curves on a surface, and other drawings in the plane, strokes are turned so
+    outlines in the plane are filled. For curves on a surface, and other drawings in the plane, strokes are flipped so
     that they bound something together, and those that bound nothing are left out. The zero set of the signed heat
     method replaces missing curves, and distance is measured along the surface. `SignedHeatSolver` runs the method
     alone.
@@ -195,7 +195,7 @@ def signed_distance(
     -------
     GridField, TetField or VertexField
         φ is negative inside shapes and filled outlines, and to the right of curves and strokes; positive on both sides
-        of sheets that bound nothing. ``diagnostics.notes`` say what was turned, left out and completed.
+        of sheets that bound nothing. ``diagnostics.notes`` say what was flipped, left out and completed.
 
     Raises
     ------

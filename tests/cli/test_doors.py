@@ -47,7 +47,7 @@ def test_morph_takes_a_spacing_and_tells_what_it_found(tmp_path, ball, capsys):
     turned.save(tmp_path / "turned.ply")
     assert main(["morph", "dilate", str(tmp_path / "turned.ply"), "0.2", "-o", str(output), *options]) == 0
     printed, said = capsys.readouterr()
-    assert "faces turned" in said
+    assert "faces flipped" in said
     field = json.loads(printed)["field"]
     assert field["spacing"] == [0.1] * 3 and picture.stat().st_size > 5000
     assert np.linalg.norm(sh.read(output).vertices, axis=1) == pytest.approx(1.2, abs=0.02)

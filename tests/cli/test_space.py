@@ -238,7 +238,7 @@ def test_demo_needs_no_file(tmp_path, capsys):
     assert main(["demo", "-o", str(tmp_path / "demo"), "--resolution", "24", "--json"]) == 0
     out, err = capsys.readouterr()
     summary = json.loads(out)
-    assert "faces turned" in err and "of the surface is completed" in err
+    assert "faces flipped" in err and "of the surface is completed" in err
     assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == sorted(map(os.path.basename, summary["files"]))
     assert inspect(sh.read(tmp_path / "demo" / "offset.stl")).is_closed
     assert sh.read_field(tmp_path / "demo" / "distance.vti").values.min() < -0.2

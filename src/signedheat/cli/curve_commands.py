@@ -229,7 +229,7 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
 
 
 def _with_pieces(field: sh.VertexField, summary: dict[str, Any], text: str) -> str:
-    """Add the curves that were turned or left out to a summary and its text."""
+    """Add the curves that were flipped or left out to a summary and its text."""
     note = field.diagnostics.note(distance.CurvesTaken)
     if note is None:
         return text

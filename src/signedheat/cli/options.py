@@ -381,7 +381,7 @@ LIDS_OPTION = option(
 )
 REPAIR = group(
     "steps (all taken by default)",
-    option("--as-oriented", action="store_true", help="turn no faces, normals or lines, and leave out no lines"),
+    option("--as-oriented", action="store_true", help="flip no faces, normals or lines, and leave out no lines"),
     option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
     LIDS_OPTION,
     option(

@@ -49,7 +49,7 @@ def close_curves(
 
     On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
     may be smaller than the triangles, and the result follows them where they are there. The mesh is
-    repaired and pieces are turned and left out as by `signed_distance`.
+    repaired and pieces are flipped and left out as by `signed_distance`.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """Distance to curves on surfaces in one call: exact where they are there, completed by heat where they are missing.
 
-It is measured on a repaired mesh: copies of faces left out, faces turned to agree.
+It is measured on a repaired mesh: copies of faces left out, faces flipped to agree.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, wi
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MeshRepaired(Note):
-    """What was done to a mesh for distance on it: faces turned, copies left out."""
+    """What was done to a mesh for distance on it: faces flipped, copies left out."""
 
     faces_turned: int
     copies: int
-    text: ClassVar[str] = "faces turned: {0.faces_turned}; copies of faces: {0.copies}"
+    text: ClassVar[str] = "faces flipped: {0.faces_turned}; copies of faces: {0.copies}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +145,7 @@ Surface = TypeVar("Surface", bound=SurfaceDomain)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurvesTaken(Note):
-    """Which of the curves given were turned, and which were left out.
+    """Which of the curves given were flipped, and which were left out.
 
     Attributes
     ----------

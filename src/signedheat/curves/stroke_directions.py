@@ -291,7 +291,7 @@ class CurveOrientation(Frozen, ShortRepr):
     curves : list of Curve and SurfacePoints
         All that was given, in order, some curves turned.
     turned : (k,) bool
-        Which of them were turned.
+        Which of them were flipped.
     agreement : (k,) float
         How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do.
         It is 1 for curves and points that are never turned.

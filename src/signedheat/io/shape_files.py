@@ -91,7 +91,7 @@ def read(path: PathLike) -> Shape | Solid:
 
     STL, OBJ, PLY, OFF, VTP, GLB, DAE, 3MF and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have
     points, and so have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order,
-    whatever their defects: nothing is merged, dropped, split or turned. STL has no vertices; corners with exactly the
+    whatever their defects: nothing is merged, dropped, split or flipped. STL has no vertices; corners with exactly the
     same coordinates become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH,
     VTU, VTK and TetGen's NODE with ELE have tets. NPZ files have solids, or fields that hold them.
 

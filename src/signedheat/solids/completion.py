@@ -162,7 +162,7 @@ def complete(
     Returns
     -------
     Solid
-        Its ``diagnostics.notes`` say which faces were turned, left out and added.
+        Its ``diagnostics.notes`` say which faces were flipped, left out and added.
 
     Raises
     ------

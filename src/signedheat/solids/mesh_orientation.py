@@ -39,7 +39,7 @@ class Orientation(Frozen, ShortRepr):
     faces : (k,) int
         Faces of the given mesh that were kept, in order.
     turned : (k,) bool
-        Which of them were turned.
+        Which of them were flipped.
     parts : (k,) int
         Piece of each face, connected across edges of two faces or closed as given; −1 for faces on fewer
         than three places, and inner walls.
@@ -50,7 +50,7 @@ class Orientation(Frozen, ShortRepr):
     n_parts, closed_parts : int
         Pieces, and those that close.
     turned_parts, turned_faces, turned_area : int, int, float
-        Pieces given facing inwards; faces turned, and their share of the area.
+        Pieces given facing inwards; faces flipped, and their share of the area.
     inconsistent_edges : int
         Edges across which two faces disagreed.
     nonmanifold_edges : int

@@ -79,7 +79,7 @@ class Solid(Displayed, Represented, Frozen):
     source : TriangleMesh, optional
         Triangles of the input, which barycentric coordinates refer to.
     diagnostics : Diagnostics
-        Notes on faces that were turned, left out and added.
+        Notes on faces that were flipped, left out and added.
 
     See Also
     --------

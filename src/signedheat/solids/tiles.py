@@ -70,7 +70,7 @@ class Evaluated(SolidQueries, Protocol):
     @property
     def windings(self) -> Windings: ...  # winding numbers, which decide what is inside
     @property
-    def diagnostics(self) -> Diagnostics: ...  # notes on faces that were turned, left out and added
+    def diagnostics(self) -> Diagnostics: ...  # notes on faces that were flipped, left out and added
 
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
