@@ -18,7 +18,9 @@ from sphinx_gallery.scrapers import figure_rst
 import signedheat
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT / "examples"), str(ROOT / "tests"), str(ROOT / "docs")]
+
+from gallery_cards import arrange  # noqa: E402
 
 from public_names import methods  # noqa: E402  of the tests
 
@@ -101,6 +103,7 @@ def check_anchors(app: Sphinx, error: Exception | None) -> None:
 def setup(app: Sphinx) -> None:
     """Connect what is done before numpydoc reads docstrings, and after all pages are written."""
     app.connect("autodoc-process-docstring", escape, priority=400)
+    app.connect("builder-inited", arrange, priority=900)  # after Sphinx-Gallery
     app.connect("source-read", link_files)
     app.connect("build-finished", check_anchors)
     app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))

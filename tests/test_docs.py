@@ -8,6 +8,7 @@ import inspect
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import signedheat
@@ -111,10 +112,34 @@ def test_examples_of_extending_run(block, monkeypatch):
     exec(compile(block, "docs/extending.md", "exec", dont_inherit=True), {"__name__": "__main__"})
 
 
+def module_of_docs(name):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "docs" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_each_example_has_a_card_of_one_trade():
+    cards = module_of_docs("gallery_cards")
+    named = [name for names in cards.TRADES.values() for name in names.split()]
+    assert sorted(named) == sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
+    assert cards.FIRST_PANEL <= set(named)
+
+
+def test_cards_show_one_panel_without_title_and_colour_bar():
+    picture = np.full((120, 400, 3), 255, np.uint8)
+    picture[5:12, 20:90] = 0  # a title
+    picture[20:110, 10:110] = (200, 0, 0)
+    picture[20:110, 150:250] = (0, 0, 200)
+    picture[20:110, 300:310] = (0, 200, 0)  # a colour bar
+    picture[20:110:20, 314:322] = 0  # its numbers
+    panel = module_of_docs("gallery_cards").panel
+    assert panel(picture, True).shape == (90, 100, 3) and (panel(picture, True) == (200, 0, 0)).all()
+    assert panel(picture, False).shape == (90, 100, 3) and (panel(picture, False) == (0, 0, 200)).all()
+
+
 def test_picture_of_the_floors_shows_all_of_them():
-    spec = importlib.util.spec_from_file_location("draw_architecture", ROOT / "docs" / "draw_architecture.py")
-    drawing = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(drawing)
+    drawing = module_of_docs("draw_architecture")
     drawn = [name for names, _, _ in drawing.FLOORS for name in names.split()]
     package = Path(signedheat.__file__).parent
     floors = {path.stem for path in package.glob("*.py")} | {path.parent.name for path in package.glob("*/__init__.py")}
