@@ -30,6 +30,8 @@ from .rims import meeting_edges, open_edges
 
 LEAST_GAIN = 0.02
 """Another reading of a part must explain at least this share of its area more than that as given."""
+MOSTLY_WRONG = 0.5
+"""A part of which more than this share is unexplained may be turned as a whole, or be a cavity of what is around it."""
 COHERENT_LEVELS = 0.7
 """Loose pieces are the remains of a body if the squared mean of their levels over the mean square is at least this.
 Bodies have 0.81 to 1, however little is left; leaves, cards and strips have 0.3 to 0.6, however many there are."""
@@ -99,22 +101,29 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
             readings, decided, missing = [inside_out], other, left
     # a single piece with nothing near it can only be turned, which is wrong where it is more right than wrong
-    doubtful = (np.bincount(parts) > 1) | (missing > 0.5) | _entangled(chain, part_of)
+    doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
     if not (doubtful & (missing >= LEAST_GAIN)).any():
         return decided
     by_odd, by_once = odd(chain), once(chain)
     differ = np.bincount(part_of[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
     overlapping = False
-    for reading, told, cavities in ((by_odd, differ, False), (by_once, doubtful, False), (by_once, doubtful, True)):
-        todo = doubtful & told & (missing >= LEAST_GAIN)
-        if not todo.any() or (cavities and not overlapping):
+    every, as_cavities = np.ones(len(missing), dtype=bool), "cavities" if nested == "given" else nested
+    trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
+        (by_odd, differ, LEAST_GAIN, True, nested),
+        (by_once, every, LEAST_GAIN, True, nested),
+        (by_once, every, LEAST_GAIN, False, nested),  # what overlaps is one body's outside and inside
+        (by_once, every, MOSTLY_WRONG, True, as_cavities),
+    )
+    for number, (reading, told, least, united, nesting) in enumerate(trials):
+        todo = doubtful & told & (missing >= least)
+        if not todo.any() or (number > 1 and not overlapping):
             continue
         readings.append(reading)
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
             tried = np.where(~whole & todo[part_of], len(readings) - 1, chosen)
             fixed = held & (tried == 0)
-            other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nested, cavities=cavities)
-            overlapping = other.overlapping
+            other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nesting, united=united)
+            overlapping |= other.overlapping
             left = missing_of(other.counts)
             better = todo & (left < missing - LEAST_GAIN)
             if (better == todo).all() or not better.any():
@@ -148,11 +157,11 @@ def _decided(
     fixed: Bools,
     nested: Nesting,
     as_oriented: bool = False,
-    cavities: bool = False,
+    united: bool = True,
 ) -> Bounding:
     """Decide which pieces of a reading bound something and which way they face; those that are `fixed` do not turn.
 
-    Open bodies within others are `cavities` of these, or they are what `nested` says.
+    Open bodies that overlap are `united`, or else they are one body's outside and inside.
     """
     counts, pieces, orientable = reading.counts, reading.pieces, reading.orientable
     n = len(orientable)
@@ -175,7 +184,7 @@ def _decided(
         given = sums_of(np.sign(counts[rest] * chain.multiplicities[rest]) * chain.areas[rest], labels, len(names))
         held = np.bincount(labels, fixed[rest]) > 0
         signs, bounds[names], loose[names], levels[names], overlapping = open_bounding(
-            Pieces(triangles, labels), groups, rims, given, around, held, "cavities" if cavities else nested
+            Pieces(triangles, labels), groups, rims, given, around, held, nested, united
         )
         flips[names] = np.where(bounds[names], signs, 1.0)
     bodies = inwards = 0
@@ -253,6 +262,7 @@ def open_bounding(
     closed: Floats,
     fixed: Bools,
     nested: Nesting = "given",
+    united: bool = True,
 ) -> tuple[Floats, Bools, Ints, Floats, bool]:
     """Find for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones or −1, and levels.
 
@@ -271,7 +281,7 @@ def open_bounding(
     alive, weights = np.ones(n, dtype=bool), np.ones(n)  # the signs of the weights are those of the pieces
     if not fixed.all():
         weights = whole.weights(fixed)
-        within = bodies_around(whole, pieces, rims, groups, alone, signs_of(weights), given, closed, nested)
+        within = bodies_around(whole, pieces, rims, groups, alone, signs_of(weights), given, closed, nested, united)
         overlapping = bool(within.any())
         if overlapping:
             whole = replace(whole, within=within)
@@ -288,8 +298,9 @@ def open_bounding(
         # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
         within = system.levels_within(signs, groups[names])
         together, spread = (means(each, groups[rows], system.areas, n)[groups] for each in (within, within**2))
-        by_itself = np.where(shared, together, alone)
-        own = (by_itself >= SHEET) & (~shared | _is_body(together, spread, members))
+        together = np.where(shared & _is_body(together, spread, members), together, 0.0)
+        by_itself = np.maximum(alone, together)
+        own = by_itself >= SHEET
         loose = alive & ~own
         shares = np.where(loose[rows], system.areas, 0.0)
         mean = means(values, clusters[rows], shares, n)

@@ -130,11 +130,13 @@ def bodies_around(
     given: Floats,
     closed: Floats,
     nested: Nesting,
+    united: bool,
 ) -> Floats:
     """(n,) winding numbers, at the places of a system, of the bodies that each place ignores.
 
     A place counts its own body, the body in which this is a cavity, and cavities in it; it ignores all others.
-    `nested` decides which bodies within others are cavities.
+    `nested` decides which bodies within others are cavities; bodies that overlap ignore each other if they are to be
+    `united`.
     """
     triangles = directed(pieces.triangles, signs[pieces.labels])
     bodies = Bodies.of(pieces, triangles, groups, alone, signs * given)
@@ -174,7 +176,7 @@ def bodies_around(
     not_nested, enclosed = surface_within < 1 - OUTSIDE, mean(on_rim, share, homes_there, others) >= 1 - OUTSIDE
     every = np.ones(count, dtype=bool)
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][homes_there]
-    ignored = (homes_there != others) & (not_nested | (enclosed & stays))
+    ignored = (homes_there != others) & ((united & not_nested) | (enclosed & stays))
     subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
     everything = WindingTree.of(np.concatenate(parts[:count]))
     around = everything.levels(system.places, system.normals, system.areas)
