@@ -28,8 +28,10 @@ from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, level
 from .readings import Reading, as_given, mixed, odd, once, unexplained
 from .rims import meeting_edges, open_edges
 
-LEAST_GAIN = 0.02
-"""Another reading of a part must explain at least this share of its area more than that as given."""
+LEAST_GAIN = 0.1
+"""Another reading must explain more than that as given, by this share of the area that counts in another way."""
+EXPLAINED = 1e-3
+"""A part of which less than this share is unexplained is taken as given: winding numbers are as inexact as that."""
 MOSTLY_WRONG = 0.5
 """A part of which more than this share is unexplained may be turned as a whole, or be a cavity of what is around it."""
 COHERENT_LEVELS = 0.7
@@ -88,32 +90,35 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     areas = np.bincount(pieces[~whole], chain.areas[~whole])
     part_areas = np.bincount(parts, areas)
 
-    def missing_of(counts: Ints) -> Floats:
+    def missing_of(decided: Bounding) -> Floats:
         """Share of the area of each part that is unexplained."""
-        return means(unexplained(chain, counts, pieces), parts, areas, len(part_areas))
+        return means(unexplained(chain, decided.counts, pieces), parts, areas, len(part_areas))
 
-    missing = missing_of(decided.counts)
+    def changed(decided: Bounding, other: Bounding) -> Floats:
+        """Share of the area of each part that counts in another way."""
+        rows = np.flatnonzero(~whole & (decided.counts != other.counts))
+        return np.bincount(part_of[rows], chain.areas[rows], len(part_areas)) / part_areas
+
+    missing = missing_of(decided)
     readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)
     if cone_volumes(chain.triangles, given.counts, part_of + 1, len(part_areas) + 1).sum() < 0:
         inside_out = _reversed(given, whole)
         other = _decided(chain, inside_out, whole, held, nested)
-        left = missing_of(other.counts)
+        left = missing_of(other)
         if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
             readings, decided, missing = [inside_out], other, left
-    # a single piece with nothing near it can only be turned, which is wrong where it is more right than wrong
-    doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
-    if not (doubtful & (missing >= LEAST_GAIN)).any():
-        return decided
     by_odd, by_once = odd(chain), once(chain)
+    # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
+    doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
     differ = np.bincount(part_of[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
-    overlapping = False
     every, as_cavities = np.ones(len(missing), dtype=bool), "cavities" if nested == "given" else nested
     trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
-        (by_odd, differ, LEAST_GAIN, True, nested),
-        (by_once, every, LEAST_GAIN, True, nested),
-        (by_once, every, LEAST_GAIN, False, nested),  # what overlaps is one body's outside and inside
+        (by_odd, differ, EXPLAINED, True, nested),
+        (by_once, every, EXPLAINED, True, nested),
+        (by_once, every, EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
         (by_once, every, MOSTLY_WRONG, True, as_cavities),
     )
+    overlapping = False
     for number, (reading, told, least, united, nesting) in enumerate(trials):
         todo = doubtful & told & (missing >= least)
         if not todo.any() or (number > 1 and not overlapping):
@@ -124,15 +129,34 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
             fixed = held & (tried == 0)
             other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nesting, united=united)
             overlapping |= other.overlapping
-            left = missing_of(other.counts)
-            better = todo & (left < missing - LEAST_GAIN)
+            left, differs = missing_of(other), changed(decided, other)
+            better = todo & (left < missing - LEAST_GAIN * differs)
             if (better == todo).all() or not better.any():
                 break
             todo = better
         # what one part gains, others must not lose
-        if better.any() and part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas[todo].sum():
+        if better.any() and part_areas @ left < part_areas @ (missing - LEAST_GAIN * differs):
             chosen, missing, decided = tried, left, other
-    return decided
+    inside = unexplained(chain, decided.counts, pieces) < MOSTLY_WRONG
+    inner = decided.inner | (~whole & (decided.counts == 0) & inside[pieces])
+    decided = replace(decided, inner=inner, turned=decided.turned & ~inner)
+    return _with_sheets_agreeing(chain, decided, by_once, whole)
+
+
+def _with_sheets_agreeing(chain: Chain, decided: Bounding, agreeing: Reading, whole: Bools) -> Bounding:
+    """Turn the triangles of complexes that bound nothing so that they agree with their neighbours."""
+    sheets = ~whole & (np.bincount(chain.complexes, decided.counts != 0) == 0)[chain.complexes]
+    if not sheets.any():
+        return decided
+    n = len(decided.orientable)
+    return replace(
+        decided,
+        pieces=np.where(sheets, n + agreeing.pieces, decided.pieces),
+        turned=np.where(sheets, agreeing.turned, decided.turned),
+        inner=decided.inner & ~sheets,
+        orientable=np.concatenate([decided.orientable, agreeing.orientable]),
+        disagreeing=agreeing.disagreeing,
+    )
 
 
 def _entangled(chain: Chain, parts: Ints) -> Bools:
@@ -195,12 +219,14 @@ def _decided(
         bounds &= ~along
         loose[along] = -1
     turned = reading.turned != (flips[pieces] < 0)
+    final = (counts * flips[pieces] * bounds[pieces]).astype(np.int64)
     with_copies = (whole | fixed) & (np.abs(counts) == np.abs(chain.multiplicities)) & ((counts == 0) | bounds[pieces])
+    with_copies &= (np.bincount(chain.complexes, final != 0) > 0)[chain.complexes]
     inner = (counts == 0) & orientable[pieces] & ~whole & ~fixed
     return Bounding(
         pieces=pieces,
         turned=turned & ~inner,
-        counts=(counts * flips[pieces] * bounds[pieces]).astype(np.int64),
+        counts=final,
         closed=closed[pieces],
         loose=loose[pieces],
         levels=levels[pieces],
@@ -293,6 +319,8 @@ def open_bounding(
         names, system = np.flatnonzero(alive), whole.chosen(alive)
         signs = signs_of(weights[names])
         values = system.levels(signs)
+        held = fixed[names[system.owners]] & (values > 0.5)  # as given, what lies within a body bounds as little
+        values[held] = 0.5 - np.abs(values[held] - np.floor(values[held]) - 0.5)
         rows, levels = names[system.owners], np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
         # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
