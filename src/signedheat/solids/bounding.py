@@ -124,19 +124,21 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         if not todo.any() or (number > 1 and not overlapping):
             continue
         readings.append(reading)
+        best = float(part_areas @ missing), decided, chosen, missing
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
             tried = np.where(~whole & todo[part_of], len(readings) - 1, chosen)
             fixed = held & (tried == 0)
             other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nesting, united=united)
             overlapping |= other.overlapping
             left, differs = missing_of(other), changed(decided, other)
+            cost = float(part_areas @ (left + LEAST_GAIN * differs))
+            if cost < best[0]:
+                best = cost, other, tried, left
             better = todo & (left < missing - LEAST_GAIN * differs)
             if (better == todo).all() or not better.any():
                 break
             todo = better
-        # what one part gains, others must not lose
-        if better.any() and part_areas @ left < part_areas @ (missing - LEAST_GAIN * differs):
-            chosen, missing, decided = tried, left, other
+        _, decided, chosen, missing = best
     inside = unexplained(chain, decided.counts, pieces) < MOSTLY_WRONG
     inner = decided.inner | (~whole & (decided.counts == 0) & inside[pieces])
     decided = replace(decided, inner=inner, turned=decided.turned & ~inner)
