@@ -1,10 +1,15 @@
 """What `inspect` counts, on shapes of which it is known."""
 
+import json
+
 import numpy as np
 import pytest
 
 import signedheat as sh
+from refusals import refused
+from shapes.bodies import box
 from signedheat import samples
+from signedheat.cli import main
 from signedheat.inspection import inspect
 
 
@@ -24,10 +29,44 @@ def test_closed_surfaces_have_nothing_wrong(mesh, euler):
     np.testing.assert_allclose(report.area, mesh.face_areas.sum(), rtol=1e-12)
 
 
-def test_soup_is_all_borders():
+def test_a_soup_of_closed_faces_is_closed():
     mesh = samples.soup(samples.sphere(1))
     found = counts(mesh, "open_edges", "borders", "components", "duplicate_vertices", "nonmanifold_vertices")
-    assert found == (240, 80, 80, 240 - 42, 0)
+    assert found == (0, 0, 1, 240 - 42, 0)
+
+
+@pytest.mark.usefixtures("in_this_process")
+@pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (300.0, -20.0, 7.0)])
+@pytest.mark.parametrize("kind", ["whole", "soup", "rounding in one corner", "hole", "touching along an edge"])
+def test_all_that_say_closed_agree(kind, place, tmp_path, capsys):
+    """`info`, `fill`, `watertight` and the mesh itself, of a file and of a mesh."""
+    turn = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    second = box((1, 1, 0), (2, 2, 1)) if "touching" in kind else box((3, 0, 0), (4, 1, 2))
+    mesh = samples.union(box((0, 0, 0), (1, 1, 1)), second)
+    vertices, faces = mesh.vertices @ turn.T + place, mesh.faces[1:] if kind == "hole" else mesh.faces
+    vertices, faces = vertices[faces].reshape(-1, 3), np.arange(faces.size).reshape(-1, 3)
+    if kind == "rounding in one corner":
+        vertices = vertices.astype(np.float32)
+        vertices[5] += np.spacing(np.abs(vertices[5]))
+    if kind == "whole":
+        vertices, faces = mesh.vertices @ turn.T + place, mesh.faces
+    closed = kind in ("whole", "soup", "rounding in one corner")
+    path = tmp_path / "shape.stl"
+    sh.TriangleMesh(vertices, faces).save(path)
+    for shape in (sh.TriangleMesh(vertices, faces), sh.read(path)):
+        report = inspect(shape)
+        assert shape.is_watertight == closed
+        assert (report.open_edges + report.nonmanifold_edges == 0) == closed
+        assert len(sh.fill_holes(shape).filled) == (kind == "hole")
+        if kind == "hole":
+            with refused(sh.errors.GeometryError):
+                shape.volume  # noqa: B018
+        else:
+            assert shape.volume == pytest.approx(2.0 if "touching" in kind else 3.0, rel=1e-4)
+    main(["watertight", str(path), "-o", str(tmp_path / "made.ply"), "--workers", "1", "--json"])
+    (found,) = json.loads(capsys.readouterr().out)["shapes"]
+    assert found["openings"] == (kind == "hole") and found["bad_edges"] == 0
+    assert sh.read(tmp_path / "made.ply").is_watertight
 
 
 def test_two_cones_at_one_tip_are_connected_but_not_manifold():

@@ -13,7 +13,7 @@ from .mesh.components import connected_components
 from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
 from .mesh.tet_shapes import FLAT_TET
 from .mesh.triangles import areas_of_polygons
-from .mesh.welding import coincident_faces, same_positions
+from .mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
@@ -84,7 +84,7 @@ class TetReport:
 
 
 def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
-    """Count the elements and defects of a shape, in O(n) time."""
+    """Count the elements and defects of a shape, in O(n) time; vertices that only rounding separates do not open it."""
     if isinstance(shape, PointCloud):
         return CloudReport(
             n_points=shape.n_points,
@@ -121,7 +121,9 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
     else:
         corners, offsets = mesh.corners, mesh.offsets
     following = following_corners(offsets)
-    heads, sides = corners[following], np.diff(offsets)
+    used, sides = _n_marked(mesh.n_vertices, corners), np.diff(offsets)
+    corners = joined_rims(mesh.vertices, corners, corners[following], ONE_PLACE)[corners]
+    heads = corners[following]
     pairs = pair_halfedges(corners, heads, mesh.n_vertices)
     duplicates = 0
     if may_coincide(pairs, corners, following):
@@ -145,7 +147,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
         degenerate_faces=int(degenerate.sum()),
         duplicate_faces=duplicates,
         duplicate_vertices=_n_repeated(mesh.vertices),
-        unreferenced_vertices=mesh.n_vertices - _n_marked(mesh.n_vertices, corners),
+        unreferenced_vertices=mesh.n_vertices - used,
         area=float(areas.sum()),
         lower=_tuple(lower),
         upper=_tuple(upper),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -191,6 +192,29 @@ def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
     cloud = str(tmp_path / "points.xyz")
     samples.oriented_points(samples.sphere(2), 50).save(cloud)
     assert json.loads(succeed(capsys, "info", cloud, "--json"))["has_normals"] is True
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_info_names_a_command_for_each_defect_that_mends_it(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ball = samples.sphere(2)
+    inner = samples.sphere(1, radius=0.5)
+    shapes = {
+        "ball with holes.ply": (samples.without_patches(ball, 2, 0.4), {"holes"}),
+        "doubled.stl": (sh.TriangleMesh(ball.vertices, [*ball.faces, *ball.faces[:5]]), {"duplicate_faces"}),
+        "hidden.off": (samples.union(ball, inner), {"hidden_parts"}),
+        "sheet.obj": (sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0.2]], [[0, 1, 2]]), {"sheets"}),
+    }
+    for name, (shape, kinds) in shapes.items():
+        shape.save(name)
+        report = json.loads(succeed(capsys, "info", name, "--json"))
+        assert kinds <= {defect["defect"] for defect in report["defects"]}, name
+        assert report["remedy"] in {defect["remedy"] for defect in report["defects"]}
+        assert all(defect["remedy"] in succeed(capsys, "info", name) for defect in report["defects"])
+        command = shlex.split(report["remedy"])
+        succeed(capsys, *command[1:])
+        mended = json.loads(succeed(capsys, "info", command[-1], "--json"))
+        assert (mended["defects"], mended["remedy"]) == ([], None), name
 
 
 def test_info_tells_which_way_parts_face(tmp_path, capsys):

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from argparse import Namespace
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -33,6 +36,10 @@ from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
 
 POINT_KINDS = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
+OUTPUTS = "filled", "whole", "wall"
+"""Endings of the names that commands for repair write to: holes closed, made a solid, sheets thickened."""
+SURFACE_FORMATS = {".stl", ".obj", ".ply", ".off", ".vtp"}
+"""Formats that these commands write; other files are repaired into the first."""
 WHOLE_AREA = 0.9999
 """A share of the area above this is all of it: the rest is rounding error."""
 
@@ -56,11 +63,15 @@ def report(file: str, arguments: Namespace) -> Summary:
     counts, found, measured = inspected(held)
     told = verdict_of_solid(held) if isinstance(held, sh.Solid) else verdict(counts, found)
     summary = {"verdict": told, "file": file, **shape_figures(held, counts, found, measured)}
+    defects = list[Defect]()
+    if isinstance(counts, SurfaceReport) and found is not None:
+        defects = defects_of(counts, found, file)
     if (unit := unit_of(file)) is not None:
         summary["units"] = unit
     if extension(file) == ".obj":
         summary["line_elements"] = len(read_obj_elements(file)[1])
     rows = {name: value for name, value in summary.items() if name != "thickness"}
+    summary |= {"defects": [asdict(defect) for defect in defects], "remedy": remedy_of(defects)}
     if found is not None:
         rows["orientation"] = orientation_text(found)
     if measured is not None:
@@ -70,6 +81,10 @@ def report(file: str, arguments: Namespace) -> Summary:
     rows |= {f"memory at {n}": "–" if size is None else f"{size / 1e9:.2f} GB" for n, size in sizes.items()}
     rows["spacing that fits"] = "–" if least is None else f"{least:.3g}"
     text = _table(rows)
+    if defects:
+        width = max(len(defect.text) for defect in defects)
+        lines = [f"{defect.text:<{width}}  {printable(defect.remedy)}" for defect in defects]
+        text += "\n\n" + "\n".join(lines)
     if arguments.curves:
         if isinstance(shape, sh.TetMesh):
             raise SourceError(
@@ -119,6 +134,56 @@ def image_report(file: str, image: sh.io.LabelImage) -> dict[str, Any]:
     return figures | {"labels": labels, "voxels": [int((values == label).sum()) for label in labels]}
 
 
+@dataclass(frozen=True)
+class Defect:
+    """A kind of defect, how often there is one, what it is in words, and the command that mends it."""
+
+    defect: str
+    count: int
+    text: str
+    remedy: str
+
+
+def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Defect]:
+    """List the defects of a surface with the command for each.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> broken = samples.without_faces(samples.sphere(2), 0.1)
+    >>> [(defect.count, defect.remedy) for defect in defects_of(*inspected(broken)[:2], "ball.stl")]
+    [(24, 'signedheat fill ball.stl -o ball_filled.stl')]
+    """
+    stem, ending = os.path.splitext(file)
+    ending = ending.lower() if ending.lower() in SURFACE_FORMATS else ".stl"
+    name, filled, whole, wall = (shlex.quote(part) for part in (file, *(f"{stem}_{x}{ending}" for x in OUTPUTS)))
+    repair = f"signedheat watertight {name} -o {whole}"
+    borders = 0 if found.undecided_area > WHOLE_AREA else counts.borders  # the outlines of sheets are no holes
+    kinds = (
+        ("holes", borders, "hole", "to complete", f"signedheat fill {name} -o {filled}"),
+        ("turned_faces", found.turned_faces, "face", "to turn", repair),
+        ("duplicate_faces", found.merged_faces, "duplicate face", "to merge", repair),
+        ("hidden_parts", found.nested_bodies, "part", "hidden in others, to leave out", repair),
+        ("nonmanifold_edges", counts.nonmanifold_edges, "edge", "of three or more faces", repair),
+    )
+    defects = [
+        Defect(kind, number, f"{_count(number, one)} {what}", remedy) for kind, number, one, what, remedy in kinds
+    ]
+    if found.undecided_area > 1 - WHOLE_AREA:
+        text = f"{percent(found.undecided_area)} of the area bounds nothing"
+        size = 0.01 * float(np.linalg.norm(np.subtract(counts.upper, counts.lower)))
+        thicken = f"signedheat morph thicken {name} {size:.2g} -o {wall}"
+        defects.append(Defect("sheets", found.undecided_parts, text, thicken))
+    return [defect for defect in defects if defect.count]
+
+
+def remedy_of(defects: Sequence[Defect]) -> str | None:
+    """Return one command that mends all defects: the only one, or that which mends all but sheets."""
+    remedies = dict.fromkeys(defect.remedy for defect in defects)
+    repairs = [remedy for remedy in remedies if remedy.startswith("signedheat watertight")]
+    return next(iter([*repairs, *remedies]), None)
+
+
 def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:
     """Say in one line whether a shape is whole, and if not, what completion will mend.
 
@@ -142,16 +207,7 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
         return "voxels: closed and oriented"
     if found.undecided_area > WHOLE_AREA:
         return "open sheets that bound nothing: `signedheat morph thicken` makes walls of them"
-    mended = (
-        (counts.borders, "hole", "to complete"),
-        (found.turned_faces, "face", "to turn"),
-        (found.merged_faces, "duplicate face", "to merge"),
-        (found.nested_bodies, "part", "hidden in others, to leave out"),
-        (counts.nonmanifold_edges, "edge", "of three or more faces"),
-    )
-    said = [f"{_count(number, name)} {what}" for number, name, what in mended if number]
-    if found.undecided_area > 1 - WHOLE_AREA:
-        said.append(f"{percent(found.undecided_area)} of the area bounds nothing")
+    said = [defect.text for defect in defects_of(counts, found, "")]
     if not said:
         return "whole: closed and oriented; distance to it is exact"
     return f"broken: {', '.join(said)}; every command takes it as it is"

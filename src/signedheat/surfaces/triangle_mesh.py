@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from ..arrays import Floats, Ints
 from ..errors import GeometryError
 from ..exchange import Elements, Exchangeable
-from ..mesh.edges import EdgeTable, edge_keys, edge_table
+from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
-from ..mesh.triangles import area_vectors, part_volumes
-from ..mesh.welding import SEAM_UNITS, joined_rims
+from ..mesh.triangles import area_vectors
+from ..mesh.welding import ONE_PLACE, SEAM_UNITS, joined_rims
 from ..search.nearest_triangles import TriangleTree
 from ..validation import coordinates, element_ids, used_bounds
 from ..words import counted
@@ -102,35 +102,72 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @property
     def area(self) -> float:
-        """Area of all faces, in square units."""
-        return float(self.face_areas.sum())
-
-    @property
-    def volume(self) -> float:
-        """Volume inside a watertight mesh, in cubic units; negative if it faces inwards, and twice where it overlaps.
-
-        Raises
-        ------
-        GeometryError
-            If the mesh is not watertight; ``sh.complete(mesh).volume`` is that of any shape.
+        """Area of all faces, in square units.
 
         Examples
         --------
         >>> from signedheat import samples
-        >>> round(samples.sphere(4).volume, 2)
-        4.18
+        >>> ball = samples.sphere(5)
+        >>> round(ball.area, 2), round(ball.volume, 2), ball.is_watertight
+        (12.56, 4.19, True)
         """
-        if not self.is_watertight:
-            raise GeometryError("the mesh is not watertight", remedy="use sh.complete(mesh).volume", element="faces")
-        return float(part_volumes(self.vertices, self.places[self.faces])[1].sum())
+        return float(self.face_areas.sum())
+
+    @property
+    def volume(self) -> float:
+        """Volume within the faces, in cubic units; negative if they face inwards.
+
+        Raises
+        ------
+        GeometryError
+            If the faces do not close, or do not agree on which side is outside.
+
+        See Also
+        --------
+        signedheat.Solid.volume : Of any shape, broken or not.
+        """
+        unbalanced = int((edge_table(self._welded_faces).balance != 0).sum())
+        if unbalanced:
+            raise GeometryError(
+                f"the mesh is not closed: {unbalanced} edges are open, or the faces there disagree",
+                remedy="use sh.complete(mesh).volume",
+                element="faces",
+            )
+        corners = self.vertices[self.faces] - self.bounds.mean(axis=0)
+        return float(np.einsum("ij,ij->", corners[:, 0], self.face_area_vectors) / 3.0)
+
+    @property
+    def is_watertight(self) -> bool:
+        """Whether each edge has exactly two faces, which agree on the outside.
+
+        Ends of open edges are one vertex if only rounding separates them.
+        The same is meant by *closed* in `signedheat info`, ``fill`` and ``watertight``. Files without numbers of
+        vertices, such as STL, join bodies that touch along an edge, which has four faces then.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> broken = samples.without_faces(samples.sphere(3), 0.1)
+        >>> broken.is_watertight, complete(broken).surface().is_watertight
+        (False, True)
+        """
+        return not self.n_bad_edges
 
     @cached_property
-    def is_watertight(self) -> bool:
-        """Whether as many faces run along every edge one way as the other; vertices at the same place count as one."""
-        tails = self.places[self.faces].ravel()
-        heads = np.roll(tails.reshape(-1, 3), -1, axis=1).ravel()
-        edges = np.unique(edge_keys(tails, heads), return_inverse=True)[1].ravel()
-        return not np.bincount(edges, np.sign(heads - tails)).any()
+    def n_bad_edges(self) -> int:
+        """Number of edges that not exactly two faces share, or along which these disagree: see `is_watertight`."""
+        table = edge_table(self._welded_faces)
+        return int(((table.face_counts != 2) | (table.balance != 0)).sum())
+
+    @cached_property
+    def _welded_faces(self) -> Ints:
+        """(k, 3) faces between vertices of which those on open edges are one if they differ by rounding.
+
+        Faces on fewer than three such vertices are left out.
+        """
+        tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
+        faces = joined_rims(self.vertices, tails, heads, ONE_PLACE)[self.faces]
+        return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
 
     @cached_property
     def edge_lengths(self) -> Floats:
