@@ -208,7 +208,7 @@ def test_words_are_those_of_a_list(call, name):
         *((lambda **flags: sh.complete(BALL, **flags), name) for name in ("as_oriented", "keep_overlaps")),
         *((lambda **flags: sh.signed_distance(RING, BALL, **flags), name) for name in ("as_oriented", "every_piece")),
         *((lambda **flags: sh.close_curves(RING, BALL, **flags), name) for name in ("as_oriented", "every_piece")),
-        *((lambda **flags: SOLID.surface(resolution=8, **flags), name) for name in ("sharp", "keep_faces")),
+        (lambda **flags: SOLID.surface(resolution=8, **flags), "sharp"),
         (lambda **flags: sh.intrinsic_delaunay(BALL, **flags), "refine"),
     ],
 )

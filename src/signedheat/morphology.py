@@ -18,7 +18,6 @@ from .arrays import Floats
 from .calls import public_call
 from .distances import signed_distance
 from .errors import (
-    GeometryError,
     InexactWarning,
     OutsideError,
     SignedHeatError,
@@ -456,7 +455,7 @@ def shell(
             raise SourceError(
                 "`measure` returned no distance to a solid with faces", remedy="leave out measure or keep_outside"
             )
-        wall = solid.surface(keep_faces=True, spacing=grid.spacing)
+        wall = solid.surface()
         try:
             inside = solid.surface(inner, spacing=grid.spacing)
         except OutsideError:
@@ -644,10 +643,7 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     faces = np.concatenate([np.stack(each, axis=1) for each in sides])
     both = concatenated([(wall.vertices, wall.faces), (vertices, faces)])
     solid = complete(TriangleMesh(*both), as_oriented=True)
-    try:
-        return solid.surface(keep_faces=True, spacing=cell)
-    except GeometryError:
-        return solid.surface(spacing=cell)
+    return solid.surface()
 
 
 def _offsets(

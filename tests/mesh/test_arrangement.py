@@ -8,10 +8,10 @@ from signedheat import samples
 from signedheat.mesh.arrangement import arranged
 from signedheat.mesh.components import connected_components
 from signedheat.mesh.edges import edge_table
+from signedheat.mesh.pinches import split_at_pinches
 from signedheat.mesh.planar_triangulation import triangulate_faces
 from signedheat.mesh.self_intersections import self_intersections
 from signedheat.mesh.triangles import face_areas
-from signedheat.solids.kept_faces import split_at_pinches
 
 CORNERS = np.array(list(np.ndindex(2, 2, 2)), dtype=float)
 SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]])

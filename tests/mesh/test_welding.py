@@ -60,7 +60,7 @@ def test_single_precision_closes_facets_that_were_rounded_one_by_one(place, size
 @pytest.mark.parametrize("unit", [1.0, 0.5])
 def test_a_house_has_its_volume_wherever_it_is(place, unit):
     vertices, faces = house(2 * unit)
-    kept = sh.complete((vertices + place, faces)).surface(keep_faces=True)
+    kept = sh.complete((vertices + place, faces)).surface()
     corners = (kept.vertices - place)[kept.faces]
     volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
     walls = 20 * 16 * 12 - 18 * 14 * 10 + 5  # and the chimney, from which the wall takes one cube

@@ -48,7 +48,7 @@ def test_volumes_and_areas_of_boxes(lower, upper, common, areas, place):
         result = getattr(a, operation)(b)
         assert result.volume == pytest.approx(volume, rel=1e-9)
         assert result.area == pytest.approx(area, rel=1e-9)
-        surface = result.surface(keep_faces=True)
+        surface = result.surface()
         assert surface.to_trimesh().volume == pytest.approx(volume, rel=1e-6)
 
 

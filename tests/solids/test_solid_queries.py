@@ -103,7 +103,7 @@ def test_volume_inside_and_surface_agree_on_boxes_that_touch_and_overlap(seed):
     solid = complete(sh.TriangleMesh(shape.vertices, faces))
     lattice = np.stack(np.meshgrid(*[np.arange(-0.9, 6, 0.2)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
     assert solid.volume == pytest.approx(solid.inside(lattice).sum() * 0.2**3, rel=0.02)
-    assert complete(solid.surface(keep_faces=True, resolution=40)).volume == pytest.approx(solid.volume, rel=1e-9)
+    assert complete(solid.surface()).volume == pytest.approx(solid.volume, rel=1e-9)
     order, rotation = rng.permutation(len(faces)), scipy.spatial.transform.Rotation.random(random_state=seed + 1)
     moved = shape.vertices @ rotation.as_matrix().T + 1e3 * np.ptp(shape.vertices)
     assert complete(sh.TriangleMesh(moved, faces[order])).volume == pytest.approx(solid.volume, rel=1e-9)
@@ -138,7 +138,7 @@ def test_boxes_whose_common_sides_rounding_parts_are_one_solid(kind, rounding):
     assert solid.volume == pytest.approx(volume, rel=20 * rounding + 1e-9)
     assert (solid.inside(points) == (solid.distance(points) < 0)).all()
     if rounding <= 1e-8:  # beyond, slits between them are kept or contoured, with a warning
-        kept = solid.surface(keep_faces=True)
+        kept = solid.surface()
         assert trimesh.Trimesh(kept.vertices, kept.faces).volume == pytest.approx(volume, rel=20 * rounding + 1e-9)
 
 

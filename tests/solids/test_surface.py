@@ -199,7 +199,7 @@ def broken():
 
 @pytest.mark.parametrize(("shape", "volume"), [pytest.param(*rest, id=name) for name, *rest in broken()])
 def test_given_faces_are_kept(shape, volume):
-    surface = complete(shape).surface(keep_faces=True)
+    surface = complete(shape).surface()
     assert_closed_edges(surface)
     assert not len(self_intersections(surface.vertices, surface.faces))
     corners = surface.vertices[surface.faces]
@@ -216,7 +216,7 @@ def test_gaps_between_sheets_are_closed_and_all_faces_kept():
     middles = [side.reshape(-1, 3).mean(axis=0) for side in sides]
     shrunk = [middle + 0.99 * (side - middle) for side, middle in zip(sides, middles, strict=True)]
     sheets = sh.TriangleMesh(np.concatenate(shrunk).reshape(-1, 3), np.arange(36).reshape(-1, 3))
-    surface = complete(turned(sheets)).surface(keep_faces=True, spacing=0.05)
+    surface = complete(turned(sheets)).surface()
     assert_closed_edges(surface)
     assert not len(self_intersections(surface.vertices, surface.faces))
     corners = surface.vertices[surface.faces]
@@ -230,23 +230,21 @@ def test_gaps_between_sheets_are_closed_and_all_faces_kept():
 def test_faces_are_kept_where_heat_completes_them():
     """What φ completes joins the rims by seams."""
     ball = samples.without_patches(samples.sphere(3), 2, 0.5)
-    surface = complete(ball, completion="heat").surface(keep_faces=True, spacing=0.15)
+    surface = complete(ball, completion="heat").surface()
     assert_closed_edges(surface)
     there = {tuple(corners) for corners in np.round(surface.vertices[surface.faces].reshape(-1, 9), 12).tolist()}
     given = np.round(ball.vertices[ball.faces].reshape(-1, 9), 12).tolist()
     assert np.mean([tuple(corners) in there for corners in given]) > 0.1
 
 
-def test_where_faces_do_not_join_the_surface_is_contoured_within_a_cell():
+def test_loose_faces_join_with_what_heat_completes():
     solid = complete(samples.without_faces(samples.sphere(3), 0.75, 1), completion="heat")
-    with pytest.warns(InexactWarning):
-        surface = solid.surface(keep_faces=True, spacing=0.1)
+    surface = solid.surface()
     assert_closed_edges(surface)
     corners = surface.vertices[surface.faces]
     volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
-    assert volume == pytest.approx(solid.volume, rel=1e-3)
-    away = np.abs(solid.distance(surface.vertices))
-    assert away.max() < 0.1 and np.mean(away < 1e-9) > 0.99
+    assert volume == pytest.approx(solid.volume, rel=1e-6)
+    assert np.abs(solid.distance(surface.vertices)).max() < 1e-5
 
 
 def assert_closed_edges(surface):
@@ -258,18 +256,23 @@ def assert_closed_edges(surface):
 
 def test_whole_shapes_keep_their_faces_as_they_are():
     torus = samples.torus()
-    surface = complete(torus).surface(keep_faces=True)
+    surface = complete(torus).surface()
     given, kept = (np.sort(each.vertices[each.faces].reshape(-1, 9), axis=0) for each in (torus, surface))
     np.testing.assert_array_equal(kept, given)
 
 
-def test_faces_cannot_be_kept_elsewhere_or_of_sheets():
-    with refused(sh.errors.SignedHeatError):
-        complete(samples.sphere(2)).surface(0.1, keep_faces=True)
+def test_a_level_or_a_grid_asks_for_a_contour_and_nothing_else_does():
+    ball = samples.sphere(2)
+    solid = complete(ball)
+    assert solid.surface().n_faces == solid.surface(tolerance=1e-9).n_faces == ball.n_faces
+    for asked in ({"level": 0.0}, {"spacing": 0.2}, {"resolution": 12}, {"sharp": False}):
+        assert solid.surface(**asked).n_faces != ball.n_faces
+
+
+def test_sheets_have_no_surface():
+    sheet = sh.TriangleMesh([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     with refused(sh.errors.GeometryError):
-        complete(sh.TriangleMesh([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])).surface(
-            keep_faces=True
-        )
+        complete(sheet).surface()
 
 
 @pytest.mark.parametrize("name", ["box", "torus with holes", "two bodies"])
@@ -288,7 +291,7 @@ def test_simplified_surfaces_are_closed_and_within_the_tolerance(name):
 
 def test_tolerances_larger_than_the_shape_leave_something():
     solid = complete(samples.sphere(2))
-    made = solid.surface(keep_faces=True, tolerance=10.0)
+    made = solid.surface(tolerance=10.0)
     assert 0 < made.n_faces < len(solid.triangles) and complete(made).volume > 0
 
 

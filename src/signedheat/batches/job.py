@@ -16,13 +16,12 @@ from ..constraints import Constraint, ZeroSet
 from ..distances import grid_around, is_plain, measured_distance
 from ..errors import (
     FileFormatError,
-    GeometryError,
     InexactWarning,
     SignedHeatError,
     SourceError,
     UnsupportedTypeError,
 )
-from ..grids.grid import RESOLUTION, Grid
+from ..grids.grid import RESOLUTION
 from ..grids.grid_field import GridField
 from ..io.field_files import BAND_FORMATS, FIELD_FORMATS
 from ..io.files import distinct_names, extension
@@ -33,14 +32,13 @@ from ..io.shape_files import SHAPE_FORMATS, read, save
 from ..io.voxel_files import LABEL_FORMATS, read_labels
 from ..kinds import ShapeLike
 from ..mesh.components import element_components
-from ..mesh.edges import edge_table
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import face_areas, part_volumes
 from ..mesh.welding import indexed
 from ..search.face_tree import FaceTree
 from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
-from ..solids.kept_faces import given_surface, unjoined
+from ..solids.kept_faces import kept_surface
 from ..solids.overlaps import Nesting
 from ..solids.sample_set import NOISE_WIDTHS, Layout
 from ..solids.sampling import sample_distances, training_points
@@ -271,8 +269,8 @@ class Job:
 class Watertight:
     """Write a closed mesh of a shape.
 
-    Faces of the shape are kept where they bound the solid and join with its completion. Elsewhere the surface is
-    contoured with its edges and corners.
+    It is that of `Solid.surface`: faces of the shape are kept where they bound the solid and join with its completion.
+    Elsewhere the surface is contoured with its edges and corners.
 
     Attributes
     ----------
@@ -285,7 +283,7 @@ class Watertight:
     tolerance : float, optional
         Simplify the surface, by no more than this distance.
     resolution, spacing
-        The grid of the contour, as for `Solid.surface`.
+        Contour the whole surface on this grid, as `Solid.surface` does; 256 nodes along the longest side by default.
     samples : int, optional
         Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
         positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
@@ -318,7 +316,7 @@ class Watertight:
     thickness: float | None = None
     contoured: bool = False
     tolerance: float | None = None
-    resolution: int = 256
+    resolution: int | None = None
     spacing: float | None = None
     samples: int | None = None
     normalize: bool = False
@@ -367,25 +365,22 @@ class Watertight:
 
     def _closed_surface(self, solid: Solid) -> tuple[TriangleMesh, str]:
         """Make a closed surface of a solid, and say how it was made."""
-        whole = partial(solid.surface, resolution=self.resolution, spacing=self.spacing)
-        contour = partial(whole, tolerance=self.tolerance)
+        resolution = CONTOUR_RESOLUTION if self.resolution is None else self.resolution
+        contour = partial(solid.surface, spacing=self.spacing, resolution=resolution, tolerance=self.tolerance)
         if self.thickness is not None:
             return contour(0.5 * self.thickness), f"thickened to {self.thickness:g}"
         areas = face_areas(solid.triangles)
         if areas[solid.bounding].sum() < SHEET_BOUNDARY * areas.sum():
             raise SourceError("the shape is a sheet, which bounds nothing", remedy="give it a thickness")
-        if self.contoured:
+        if self.contoured or self.resolution is not None or self.spacing is not None:
             return contour(), "contoured"
-        cell = float(Grid.around(solid.bounds, self.resolution, None, self.spacing).spacing.max())
-        try:
-            kept, places = given_surface(solid, whole, cell)
-            made = kept if self.tolerance is None else simplified(kept, self.tolerance)
-            return made, f"faces kept but {unjoined(places)}" if len(places) else "faces kept"
-        except GeometryError as error:
-            reason = str(error).partition(":")[0]
-            return contour(), f"contoured, since {reason}"
+        kept = kept_surface(solid)
+        made = kept.mesh if self.tolerance is None else simplified(kept.mesh, self.tolerance)
+        return made, kept.note or "faces kept"
 
 
+CONTOUR_RESOLUTION = 256
+"""Nodes along the longest side for contours that are asked for without a grid."""
 SHEET_BOUNDARY = 1e-3
 """A shape is a sheet if less than this share of its area bounds its solid."""
 PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
@@ -422,7 +417,7 @@ def faults_of(surface: TriangleMesh) -> dict[str, object]:
     """Count pairs of faces that cross, and edges that not exactly two faces share."""
     return {
         "self_intersections": len(self_intersections(surface.vertices, surface.faces)),
-        "bad_edges": int((edge_table(surface.faces).face_counts != 2).sum()),
+        "bad_edges": surface.n_bad_edges,
     }
 
 

@@ -133,15 +133,15 @@ def check_watertight(arguments: Namespace) -> None:
     "closed meshes of broken shapes",
     "The closed mesh of each shape, and a line that says what it is: bodies, volume, what was completed, how far it is "
     "from the faces that were given, and back. Faces are kept where they bound the solid and join with its completion; "
-    "elsewhere the surface is contoured with its edges and corners. Sheets are refused unless they are given a "
-    "thickness.",
+    "elsewhere, and everywhere if a resolution or spacing is given, the surface is contoured with its edges and "
+    "corners. Sheets are refused unless they are given a thickness.",
     output("a file for one shape; or a folder for the files of many, and manifest.jsonl"),
     *(*MANY_SHAPES, LABEL, UNITS_OPTION),
     option("--thickness", type=positive, metavar="D", help="thickness of solids around sheets"),
     option("--contour", action="store_true", help="contour everything, with even triangles instead of few"),
     option("--tolerance", type=positive, metavar="D", help="use fewer triangles, within this distance (manifold3d)"),
-    option("--resolution", type=whole_number(2), metavar="N", help="nodes along the longest side, for contours (256)"),
-    option("--spacing", type=positive, metavar="H", help="cells of contours, in units of the file"),
+    option("--resolution", type=whole_number(2), metavar="N", help="contour with N nodes along the longest side (256)"),
+    option("--spacing", type=positive, metavar="H", help="contour in cells of this size, in units of the file"),
     option(
         "--sample",
         type=whole_number(1),
@@ -160,7 +160,7 @@ def watertight(arguments: Namespace) -> Summary:
         thickness=arguments.thickness,
         contoured=arguments.contour,
         tolerance=arguments.tolerance,
-        resolution=arguments.resolution or sh.batches.Watertight.resolution,
+        resolution=arguments.resolution,
         spacing=arguments.spacing,
         samples=arguments.sample,
         normalize=arguments.normalize,

@@ -25,7 +25,7 @@ def solids() -> None:
     sh.signed_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
     points = sh.PointCloud(ball.vertices)
     sh.signed_distance(points, sh.Grid.around(ball.bounds, 20))
-    sh.complete(samples.without_patches(ball, 1, 0.5)).surface(keep_faces=True)
+    sh.complete(samples.without_patches(ball, 1, 0.5)).surface()
     field = sh.SignedHeatSolver(sh.Grid.around(broken, 12)).distance(broken)
     sh.sharpen(field)
     sh.redistance(field)

@@ -212,7 +212,7 @@ def save_solid(solid: Solid, path: PathLike) -> None:
     """Write a solid to a NumPy archive, or its surface in a format of shapes."""
     ensure_writable(path, SOLID_FORMATS | SHAPE_FORMATS, "a solid")
     if extension(path) not in SOLID_FORMATS:
-        return save(solid.surface(keep_faces=True), path)
+        return save(solid.surface(), path)
     write_npz(path, solid_version=ARCHIVE_VERSION, **arrays_of(solid))
 
 

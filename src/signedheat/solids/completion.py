@@ -23,15 +23,17 @@ from ..jobs import Progress, Stopwatch
 from ..kinds import ShapeLike
 from ..linear.threads import one_blas_thread
 from ..memory import refuse_beyond_memory
+from ..mesh.arrangement import SAME_POINT
 from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
-from ..mesh.welding import indexed
+from ..mesh.welding import indexed, tolerances
 from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import joined_shape
 from ..validation import chosen, flag
+from .bodies import whole_boundary
 from .bounding import Bounding, bounding
 from .chain import Chain
 from .closing import LOST_FACE_SIDES, closed_by, fan, small_lids
@@ -39,9 +41,11 @@ from .heat_surfaces import Heat, heat_surface
 from .mesh_orientation import oriented_as, owners_of
 from .overlaps import Nesting
 from .point_orientation import mean_gap, orient_points, without_strays
+from .regions import TOLERANCES
 from .rims import boundary, divided_at_rims, loops
 from .solid import Solid
 from .union import TriangleGroup, united
+from .winding import Windings
 
 
 def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
@@ -240,6 +244,7 @@ def completed(
         chain = replace(chain)  # drops the cached properties that only `bounding` needs
         with stopwatch("complete") as run:
             solid = run(partial(_from_mesh, triangles, chain, decided, options, method))
+            solid = _with_whole_boundary(solid, triangles)
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
     for note in solid.diagnostics.notes if not isinstance(joined, PointCloud) else ():
@@ -247,6 +252,36 @@ def completed(
             warn_user(f"{note}: where so much is missing, the result is a guess", InexactWarning)
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
+
+
+def _with_whole_boundary(solid: Solid, mesh: TriangleMesh) -> Solid:
+    """Replace the triangles that bound the solid of a mesh where the cut of its chain is not proven to bound it."""
+    cut = solid.triangles[solid.bounding]
+    if np.array_equal(cut, solid.windings.triangles):
+        return solid
+    made = whole_boundary(cut, solid.windings, mesh)
+    if made is None:
+        return solid
+    # what lies on a face of the mesh is part of it; the rest is completion, as sure as the nearest part of it was
+    given = np.flatnonzero(face_areas(mesh.vertices[mesh.faces]) > 0)
+    tree = FaceTree.of_triangles(mesh.vertices[mesh.faces[given]])
+    faces, squares = tree.nearest(made.mean(axis=1))
+    on = np.sqrt(squares) <= TOLERANCES[-1] * tolerances(*indexed(made), SAME_POINT)
+    origins = np.where(on, given[tree.features.ids[faces]], -1)
+    confidence, added = np.ones(len(made), dtype=np.float32), solid.origins < 0
+    if added.any() and not on.all():
+        patches = FaceTree.of_triangles(solid.triangles[added])
+        nearest = patches.features.ids[patches.nearest(made[~on].mean(axis=1))[0]]
+        confidence[~on] = solid.confidence[added][nearest]
+    rest = ~solid.bounding
+    return replace(
+        solid,
+        triangles=np.concatenate([made, solid.triangles[rest]]),
+        origins=np.concatenate([origins, solid.origins[rest]]),
+        confidence=np.concatenate([confidence, solid.confidence[rest]]),
+        bounding=np.append(np.ones(len(made), dtype=bool), np.zeros(int(rest.sum()), dtype=bool)),
+        windings=Windings(made),
+    )
 
 
 def bytes_to_complete(shape: SurfaceShape, count: int) -> float:

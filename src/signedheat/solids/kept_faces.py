@@ -6,28 +6,33 @@ inside at a wall of a box, the wall closes the step between them.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
+from ..grids.grid import RESOLUTION, Grid
+from ..jobs import Progress
 from ..mesh.arrangement import SAME_POINT, arranged, meeting_faces
-from ..mesh.components import by_first_use, connected_components, element_components, numbered, sums_of
+from ..mesh.components import element_components, numbered, sums_of
 from ..mesh.edges import edge_table
-from ..mesh.self_intersections import self_intersections
-from ..mesh.triangles import divided_at, part_volumes
-from ..mesh.unit_vectors import angles_around
-from ..mesh.welding import coincident_faces, indexed, tolerances
+from ..mesh.pinches import split_at_pinches
+from ..mesh.triangles import part_volumes
+from ..mesh.welding import indexed, tolerances
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..words import counted
-from .regions import cut_and_sided, widest
+from .bodies import crossing_faces, whole_boundary, without_doubles
+from .contouring import sharp_surface
+from .offsets import Offset
+from .regions import TOLERANCES, widest
 from .tiles import Evaluated
 from .winding import Windings
 
+MOST_CONTOURS = 6
+"""Largest number of rounds in which more of a surface is contoured; one that does not improve it is the last."""
 MISSING_FACE = 0.5
 """Distance from the faces, in cells, above which a contour shows that faces are missing. Cut edges are nearer."""
 WALL_SHIFT = np.array([0.37, 0.41, 0.43])
@@ -50,7 +55,8 @@ class Joined:
         """Find where triangles do not close or pass through each other."""
         table = edge_table(faces)
         gaps = table.vertices[table.balance != 0]
-        meeting = faces[np.unique(self_intersections(points, faces))]
+        depths = TOLERANCES[-1] * tolerances(points, faces, SAME_POINT)  # merging leaves crossings as deep as this
+        meeting = faces[np.unique(crossing_faces(points, faces, depths))]
         return cls(points, faces, np.concatenate([gaps, meeting[:, :2], meeting[:, 1:]]), bool(len(gaps)))
 
     @property
@@ -60,8 +66,16 @@ class Joined:
         return TriangleMesh(*split_at_pinches(self.points[used], faces.reshape(-1, 3)))
 
 
-def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: float) -> tuple[TriangleMesh, Floats]:
-    """Join the bounding triangles of a solid into a closed mesh; return it, and (k, 3) places where it is a contour."""
+@dataclass(frozen=True, eq=False)
+class KeptSurface:
+    """The boundary of a solid as one closed mesh, and a note on where it is a contour, empty if nowhere."""
+
+    mesh: TriangleMesh
+    note: str = ""
+
+
+def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurface:
+    """Join the bounding triangles of a solid into a closed mesh, and contour it where they do not join."""
     windings = solid.windings
     bounding = solid.triangles[solid.bounding]
     if not len(bounding):
@@ -70,49 +84,32 @@ def given_surface(solid: Evaluated, contour: Callable[[], TriangleMesh], cell: f
         )
     whole = Joined.of(*indexed(bounding))
     if len(whole.bad):
-        whole = _conforming(whole, windings)
+        proven = whole_boundary(bounding, windings)
+        whole = whole if proven is None else Joined.of(*indexed(proven))
     if not len(whole.bad):
-        return whole.mesh, np.zeros((0, 3))
-    best: tuple[Joined, Boxes | None] | None = None if whole.open else (whole, None)
-    surface = contour()
-    bad = [_far(surface, whole.points[whole.faces], MISSING_FACE * cell)]
-    found: Joined = whole
-    for attempt in range(6):  # with other walls each time
-        bad.append(_along(found.points[found.bad], 0.5 * cell))
+        return KeptSurface(whole.mesh)
+    grid = Grid.around(solid.bounds, RESOLUTION)
+    cell = float(grid.spacing.max())
+    surface = sharp_surface(Offset(solid, 0.0), grid, progress)
+    bad, best = [_far(surface, whole.points[whole.faces], MISSING_FACE * cell)], whole
+    for attempt in range(MOST_CONTOURS):  # with other walls each time
+        bad.append(_along(best.points[best.bad], 0.5 * cell))
         boxes = Boxes.around(np.concatenate(bad), cell, (attempt + 1) * WALL_SHIFT % 1)
         found = _exchanged(whole, windings, surface, boxes)
-        if not found.open and (best is None or len(found.bad) < len(best[0].bad)):
-            best = found, boxes
+        if attempt and (found.open, len(found.bad)) >= (best.open, len(best.bad)):
+            break
+        best, used = found, boxes
         if not len(found.bad):
             break
-    if best is None:
-        place = found.points[found.bad[0]].mean(axis=0)
-        raise GeometryError(
-            f"faces and completion do not join, first at ({place[0]:.4g}, {place[1]:.4g}, {place[2]:.4g})",
-            remedy="leave out keep_faces: the sharp surface is closed",
-            element="surface",
-        )
-    found, places = best
-    return (found.mesh, np.zeros((0, 3))) if places is None else (_without_crumbs(found.mesh, places), places.middles)
+    if not best.open and (whole.open or len(best.bad) < len(whole.bad)):
+        return KeptSurface(_without_crumbs(best.mesh, used), f"faces kept but {_unjoined(used.middles)}")
+    x, y, z = whole.points[whole.bad[0]].mean(axis=0)
+    if whole.open:
+        return KeptSurface(surface, f"contoured: the faces do not join, first at ({x:.4g}, {y:.4g}, {z:.4g})")
+    return KeptSurface(whole.mesh, f"faces kept, but some cross, the first at ({x:.4g}, {y:.4g}, {z:.4g})")
 
 
-def _conforming(whole: Joined, windings: Windings) -> Joined:
-    """Divide triangles where they cross or end on each other, and drop parts that lie inside or cancel in pairs."""
-    cut = partial(arranged, whole.points, whole.faces, None)
-    slacks = tolerances(whole.points, whole.faces, SAME_POINT)
-    pieces, regions = cut_and_sided(cut, slacks, np.ones(len(whole.faces), dtype=bool), windings)
-    return Joined.of(pieces.points, _without_doubles(pieces.faces[regions.bounds]))
-
-
-def _without_doubles(faces: Ints) -> Ints:
-    """Drop pairs of faces on the same vertices that face opposite ways, and faces on fewer than three vertices."""
-    first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
-    proper = first >= 0
-    forth, back = (np.bincount(first[proper & (reverse == way)], minlength=len(faces)) for way in (False, True))
-    return faces[proper & ~((forth == 1) & (back == 1))[first]]
-
-
-def unjoined(places: Floats) -> str:
+def _unjoined(places: Floats) -> str:
     """Say where a contour was taken, for messages."""
     x, y, z = places[0]
     around = "one place" if len(places) == 1 else f"{counted(len(places), 'place')}, the first"
@@ -136,8 +133,9 @@ def _far(surface: TriangleMesh, triangles: Floats, distance: float) -> Floats:
 def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: Boxes) -> Joined:
     """Replace what is in boxes by a surface, and add walls of the boxes where only one of the two has its inside."""
     contour = surface.vertices[surface.faces]
-    points, faces = indexed(np.concatenate([whole.points[whole.faces], contour, boxes.walls]))
-    sets = np.repeat(np.arange(3), [len(whole.faces), len(contour), len(boxes.walls)])
+    near = contour[boxes.grown.have(surface.vertices)[surface.faces].any(axis=1)]
+    points, faces = indexed(np.concatenate([whole.points[whole.faces], near, boxes.walls]))
+    sets = np.repeat(np.arange(3), [len(whole.faces), len(near), len(boxes.walls)])
     pairs = meeting_faces(points, faces)
     pieces = arranged(points, faces, pairs[sets[pairs[:, 0]] != sets[pairs[:, 1]]])
     centres = widest(pieces)
@@ -147,7 +145,7 @@ def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: 
     chosen = [(kind == 0) & ~within, (kind == 1) & within, walls[here & ~there]]
     backwards = pieces.faces[walls[there & ~here]][:, ::-1]
     return Joined.of(
-        pieces.points, _without_doubles(np.concatenate([*(pieces.faces[each] for each in chosen), backwards]))
+        pieces.points, without_doubles(np.concatenate([*(pieces.faces[each] for each in chosen), backwards]))
     )
 
 
@@ -212,52 +210,3 @@ def _among(places: Ints, others: Ints) -> Bools:
     both = np.concatenate([others, places])
     keys = np.ravel_multi_index(tuple((both - both.min(axis=0)).T), tuple(np.ptp(both, axis=0) + 1))
     return np.isin(keys[len(others) :], keys[: len(others)])
-
-
-def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Double the edges and vertices at which parts of a closed mesh touch, so that the insides of parts do not meet."""
-    points, faces = _split(points, faces)
-    while True:
-        table = edge_table(faces)
-        crowded = np.where(table.face_counts[table.face_edges] > 2, table.face_edges, len(table.vertices))
-        if not (crowded < len(table.vertices)).any():
-            return points, faces
-        least = crowded.min(axis=1)  # of each face only one edge is divided at a time
-        agreed = np.bincount(least, minlength=len(table.vertices) + 1)[:-1] == table.face_counts
-        edges = np.flatnonzero(agreed & (table.face_counts > 2))
-        rows, corners = np.nonzero(np.isin(table.face_edges, edges))
-        middles = len(points) + np.searchsorted(edges, table.face_edges[rows, corners])
-        points = np.concatenate([points, points[table.vertices[edges]].mean(axis=1)])
-        points, faces = _split(points, divided_at(faces, rows, corners, middles))
-
-
-def _split(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Give each fan of faces around a vertex a vertex of its own."""
-    table = edge_table(faces)
-    starts, halfedges = table.halfedges
-    edges = table.face_edges.ravel()
-    crowded = np.flatnonzero(table.face_counts[edges[halfedges]] > 2)  # two faces have only one order
-    around = halfedges.copy()
-    around[crowded] = _in_turn(points, faces, table.vertices[edges[halfedges[crowded]]], halfedges[crowded])
-    previous = np.arange(len(around)) - 1
-    previous[starts[:-1]] = starts[1:] - 1
-    forward = table.forward.ravel()
-    paired = forward[around] & ~forward[around[previous]]
-    one, other = around[paired], around[previous[paired]]
-    following, beyond = (3 * (each // 3) + (each + 1) % 3 for each in (one, other))
-    corners = connected_components(faces.size, np.concatenate([one, following]), np.concatenate([beyond, other]))
-    if int(corners.max(initial=-1)) + 1 == len(np.unique(faces)):
-        return points, faces
-    numbers, _ = by_first_use(corners, int(corners.max()) + 1)
-    owners = np.empty(int(numbers.max()) + 1, dtype=np.int64)
-    owners[numbers] = faces.ravel()
-    return points[owners], numbers.reshape(-1, 3)
-
-
-def _in_turn(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
-    """Sort (k,) halfedges, given edge by edge with (k, 2) ends of their edges, by the angles of faces around edges."""
-    tails, heads = points[ends].swapaxes(0, 1)
-    away = points[faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]] - tails
-    angles = angles_around(heads - tails, away)
-    edges = np.cumsum(np.append(0, (ends[1:] != ends[:-1]).any(axis=1)))
-    return halfedges[np.lexsort((angles, edges[: len(ends)]))]

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Bools, Floats, Frozen, Ints, short
 from ..calls import public_call
 from ..diagnostics import CompletedArea, Diagnostics, Note
-from ..errors import InexactWarning, SignedHeatError, SourceError, warn_user
+from ..errors import InexactWarning, SourceError, warn_user
 from ..exchange import Displayed
 from ..foreign import Represented
 from ..grids.grid import RESOLUTION, Grid
@@ -33,7 +33,7 @@ from ..transforms import transformed
 from ..validation import finite_number, flag, positive_number, query_points, refuse_beside, shaped
 from ..words import counted, percent
 from .contouring import announce_lost, sharp_surface
-from .kept_faces import given_surface, unjoined
+from .kept_faces import kept_surface
 from .offsets import Offset, Reach
 from .sample_set import NOISE_WIDTHS, Samples
 from .simplification import simplified
@@ -340,88 +340,91 @@ class Solid(Displayed, Represented, Frozen):
     @public_call
     def surface(
         self,
-        level: float = 0.0,
+        level: float | None = None,
         *,
-        sharp: bool = True,
-        keep_faces: bool = False,
-        tolerance: float | None = None,
-        resolution: int = 128,
         spacing: ArrayLike | None = None,
+        resolution: int | None = None,
+        sharp: bool = True,
+        tolerance: float | None = None,
         progress: Progress | None = None,
     ) -> TriangleMesh:
-        """Extract the closed, manifold surface at a level of the distance, with normals towards greater distance.
+        """Return the closed surface of the solid: the input's faces and their completion, or a contour.
 
-        Sharp surfaces have the edges and corners of the level, and do not intersect themselves. Parts thinner than a
-        cell may be missing, with an `InexactWarning` if they are more than edges and tips. Memory grows with the
-        surface, not with the grid.
+        If neither a level nor a grid is asked for, the faces are kept, and cut where bodies overlap. This is exact and
+        has few triangles. Edges are divided where the completion is finer. Where faces and completion do not join, the
+        surface is contoured, with an `InexactWarning` that says where.
+
+        A level, a spacing or a resolution asks for a contour: even triangles in the cells of a grid, with normals
+        towards greater distance. A sharp contour has the edges and corners of the level, and does not intersect itself.
+        Parts thinner than a cell may be missing, with an `InexactWarning` if they are more than edges and tips. Memory
+        grows with the surface, not with the grid.
 
         Parameters
         ----------
-        level : float
-            Signed distance, in units of length; negative inside.
+        level : float, optional
+            Contour the surface at this signed distance, in units of length; negative inside.
+        spacing : float or (3,) float, optional
+            Contour with cells of this size.
+        resolution : int, optional
+            Contour with this number of nodes along the longest side of a grid that contains the solid and the surface;
+            128 if only a level is given.
         sharp : bool
-            Use dual contouring with exact distances and normals; otherwise marching cubes, which cut edges off.
-        keep_faces : bool
-            At level 0, return the input's faces, cut where bodies overlap, and their completion. This is exact and has
-            few triangles. Edges are divided where the completion is finer, and bodies that touch share edges. Where
-            faces and completion do not join, the surface is contoured, with an `InexactWarning` that says where.
+            Contour by dual contouring with exact distances and normals; False contours by marching cubes, which cut
+            edges off.
         tolerance : float, optional
             Simplify the surface with manifold3d: no point of either surface is farther than this from the other. If
             manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
-        resolution : int
-            Nodes along the longest side of a grid that contains the solid and the surface.
-        spacing : float or (3,) float, optional
-            Size of the cells, in place of `resolution`.
         progress : callable, optional
             Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
         Returns
         -------
         TriangleMesh
-            A sharp surface has the corners and edges of the level: on rotated boxes, 98 % of the length of edges is
-            exact to a thousandth of a cell, and the rest to a tenth.
+            A closed mesh with an inside, in which each edge has two faces. A sharp contour has the corners and edges of
+            the level: on rotated boxes, 98 % of the length of edges is exact to a thousandth of a cell, and the rest to
+            a tenth.
 
         Raises
         ------
         OutsideError
             If the distance takes this value nowhere, or only in parts thinner than a cell.
         GeometryError
-            If faces are to be kept but do not join even with a contour (the message says where); or if a surface whose
-            bodies touch along edges is to be simplified.
-        SignedHeatError
-            If faces are to be kept at another level than 0.
+            If faces are to be kept but bound nothing; or if a surface whose bodies touch along edges is to be
+            simplified.
         MemoryLimitError
             If the cells do not fit in memory. Raised before they are allocated.
+
+        See Also
+        --------
+        signedheat.offset : Round, mitred or sharp corners, and distances that vary.
+        Solid.to_trimesh : The same surface as an object of trimesh.
 
         Examples
         --------
         >>> from signedheat import samples
         >>> from signedheat.solids.completion import complete
-        >>> surface = complete(samples.sphere(3)).surface(-0.2, resolution=32)
-        >>> bool(np.abs(np.linalg.norm(surface.vertices, axis=1) - 0.8).max() < 0.01)
+        >>> open_ball = samples.without_faces(samples.sphere(3), 0.01)
+        >>> solid = complete(open_ball)
+        >>> kept, contour = solid.surface(), solid.surface(-0.2, resolution=32)
+        >>> kept.n_faces == open_ball.n_faces + solid.completion.n_faces
+        True
+        >>> bool(np.abs(np.linalg.norm(contour.vertices, axis=1) - 0.8).max() < 0.02)
         True
         """
-        sharp, keep_faces = flag(sharp, "sharp"), flag(keep_faces, "keep_faces")
+        smooth = not flag(sharp, "sharp")
         if tolerance is not None:
             within = positive_number(tolerance, "tolerance")
-            whole = self.surface(
-                level, sharp=sharp, keep_faces=keep_faces, resolution=resolution, spacing=spacing, progress=progress
-            )
+            whole = self.surface(level, spacing=spacing, resolution=resolution, sharp=sharp, progress=progress)
             return simplified(whole, within)
-        height = finite_number(level, "level")
-        if keep_faces:
-            if height != 0:
-                raise SignedHeatError("faces can be kept at level 0 only", remedy="leave out keep_faces or the level")
-            cell = float(Grid.around(self.bounds, resolution, None, spacing).spacing.max())
-            surface, places = given_surface(
-                self, lambda: self.surface(resolution=resolution, spacing=spacing, progress=progress), cell
-            )
-            if len(places):
-                warn_user(f"faces are kept but {unjoined(places)}", InexactWarning)
-            return surface
+        if level is None and spacing is None and resolution is None and not smooth:
+            kept = kept_surface(self, progress)
+            if kept.note:
+                warn_user(kept.note, InexactWarning)
+            return kept.mesh
+        height = 0.0 if level is None else finite_number(level, "level")
         reach = self.bounds + np.array([[-1.0], [1.0]]) * max(height, 0.0)
-        where = Grid.around(reach, resolution, None, spacing)
-        if sharp:
+        where = Grid.around(reach, RESOLUTION if resolution is None else resolution, None, spacing)
+        if not smooth:
             return sharp_surface(Offset(self, height), where, progress)
         contour = dense_field(self, where, progress).contour(height)
         announce_lost(Offset(self, height), where, contour.vertices)
@@ -592,7 +595,7 @@ class Solid(Displayed, Represented, Frozen):
         """Write the solid to a ``.npz`` file, or its surface to another format.
 
         `signedheat.read` reads a ``.npz`` file, without notes, and does not complete the shape again. Formats of
-        shapes, such as ``.stl``, hold ``surface(keep_faces=True)``.
+        shapes, such as ``.stl``, hold ``surface()``.
 
         Parameters
         ----------

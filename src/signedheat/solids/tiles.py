@@ -62,6 +62,8 @@ class Evaluated(SolidQueries, Protocol):
     @property
     def origins(self) -> Ints: ...  # (m,) face of the source of each triangle; −1 in the completion
     @property
+    def bounds(self) -> Floats: ...  # (2, 3) corners of the box around the triangles
+    @property
     def bounding(self) -> Bools: ...  # (m,) whether a triangle has the inside behind it only
     @property
     def source(self) -> TriangleMesh | None: ...  # triangles of the input, if they are known

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
-from ..errors import GeometryError, SourceError
+from ..errors import SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged, meeting_faces
 from ..mesh.components import first_members
 from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import concatenated
+from .bodies import same_solid
 from .regions import cut_and_sided
 from .solid import Solid, completed_area, still_true
 from .winding import Windings
@@ -82,11 +83,10 @@ def united(
 
 
 def _windings_of(triangles: Floats, given: Windings) -> Windings:
-    """Return the winding numbers of what bounds the inside; those given if no cut succeeded, so that it is open."""
-    try:
-        return Windings(triangles)
-    except GeometryError:
+    """Return the winding numbers of what bounds the inside; the given ones if it is not the same solid."""
+    if np.array_equal(triangles, given.triangles) or not same_solid(triangles, given):
         return given
+    return Windings(triangles)
 
 
 def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:

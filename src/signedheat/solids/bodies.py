@@ -1,0 +1,262 @@
+"""The boundary of a solid as closed triangles, proven equal to the solid of its chain.
+
+The winding numbers of a closed chain say what is inside. Triangles bound the same solid if they are closed, if the
+inside is behind each of them and not in front, and if they lie wherever the inside ends. Where the cut of a chain fails
+that proof, other ways to unite its bodies are tried. Bodies are the parts of the mesh that are closed as given, or what
+remains connected of the chain where the surfaces that meet along its edges are separated. If none passes through
+itself, manifold3d unites them: its result is closed however flat the angles are at which faces cross, and however close
+they lie. Otherwise the cut is cut again, and what is left open, which is thinner than what it merges, is closed by
+cones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..compiled import compiled
+from ..mesh.arrangement import SAME_POINT, arranged
+from ..mesh.components import element_components
+from ..mesh.edges import edge_table, orient_faces
+from ..mesh.pinches import separated
+from ..mesh.self_intersections import overlap, overlapping_faces
+from ..mesh.triangles import area_vectors, face_areas, halved, heights, part_volumes
+from ..mesh.unit_vectors import unit
+from ..mesh.welding import ONE_PLACE, coincident_faces, indexed, same_positions, tolerances
+from ..packages import lazy_module
+from ..search.face_tree import FaceTree
+from ..surfaces.triangle_mesh import TriangleMesh
+from .closing import fan
+from .regions import TOLERANCES, cut_and_sided
+from .winding import Windings
+
+manifold3d: Any = lazy_module("manifold3d", "unions of bodies")
+
+ROUNDING = ONE_PLACE * 2.0**-24
+"""Distance by which rounding of files in single precision may move points, relative to the size of their part."""
+PROOF_SAMPLES = 20_000
+"""Largest number of faces whose sides are compared, evenly spread over all."""
+WRONG_VOLUME = 1e-6
+"""Largest share of the volume of a solid by which what is proven equal to it may differ."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """Closed surfaces in which each edge has two faces, counter-clockwise as seen from outside; cavities clockwise."""
+
+    points: Floats  # (n, 3)
+    faces: Ints  # (m, 3)
+    labels: Ints  # (m,) body of each face
+    volumes: Floats  # (b,) volume of each body, negative for cavities
+
+    @classmethod
+    def of_chain(cls, windings: Windings) -> Bodies | None:
+        """Separate the bodies of a chain; None if edges cannot be paired."""
+        points, faces = indexed(windings.triangles)
+        proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+        points, faces = separated(points, faces[proper], overlapping=True)
+        return cls(points, faces, *part_volumes(points, faces))._clean
+
+    @classmethod
+    def of_mesh(cls, mesh: TriangleMesh, windings: Windings) -> Bodies | None:
+        """Take the parts of a mesh, all of which must be closed, and turn them as the chain made of them faces."""
+        faces = mesh.faces[(mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)]
+        areas = face_areas(mesh.vertices[faces])
+        oriented = orient_faces(faces, areas, mesh.n_vertices)
+        if not oriented.orientable.all():
+            return None
+        faces = np.where(oriented.turned[:, None], faces[:, ::-1], faces)
+        points, faces = separated(mesh.vertices, faces)
+        labels, volumes = part_volumes(points, faces)
+        faces = np.where((volumes < 0)[labels][:, None], faces[:, ::-1], faces)
+        # the inside ends in front of the faces of bodies, and behind those of cavities
+        sides = Sides.of(points[faces], tolerances(points, faces, SAME_POINT), windings)
+        ends = sides.behind.astype(np.int64) - sides.ahead
+        inner = np.bincount(labels[sides.rows], ends * face_areas(points[faces])[sides.rows], len(volumes)) < 0
+        faces = np.where(inner[labels][:, None], faces[:, ::-1], faces)
+        return cls(points, faces, labels, np.where(inner, -1.0, 1.0) * np.abs(volumes))._clean
+
+    @property
+    def _clean(self) -> Bodies | None:
+        """These bodies, or None if an edge has not two faces, or if a body passes through itself."""
+        table = edge_table(self.faces)
+        if (table.face_counts != 2).any() or (table.balance != 0).any():  # manifold3d may crash on such meshes
+            return None
+        crossing = self.labels[crossing_faces(self.points, self.faces, tolerances(self.points, self.faces, ROUNDING))]
+        return None if (crossing[:, 0] == crossing[:, 1]).any() else self
+
+    @property
+    def united(self) -> Floats | None:
+        """(k, 3, 3) triangles that bound the union, without cavities that lie in a single body; None if it fails."""
+        widths = tolerances(self.points, self.faces, ROUNDING)
+        flat = np.abs(self.volumes) <= np.bincount(self.labels, widths * face_areas(self.points[self.faces]))
+        made: dict[int, Any] = {}
+        for body in np.flatnonzero(~flat).tolist():
+            used, faces = np.unique(self.faces[self.labels == body], return_inverse=True)
+            faces = faces.reshape(-1, 3)[:, :: 1 if self.volumes[body] > 0 else -1]
+            made[body] = manifold3d.Manifold(manifold3d.Mesh64(self.points[used], faces.astype(np.uint64)))
+            if made[body].status() != manifold3d.Error.NoError or made[body].is_empty():
+                return None
+        outer = [body for body in made if self.volumes[body] > 0]
+        for cavity in (body for body in made if self.volumes[body] < 0):
+            place = self.points[self.faces[np.argmax(self.labels == cavity)]].mean(axis=0)[None]
+            around = [body for body in outer if self._windings(body).numbers_once(place)[0] > 0.5]
+            if not around:
+                return None
+            if len(around) == 1:
+                made[around[0]] -= made[cavity]
+        if not outer:
+            return None
+        whole = manifold3d.Manifold.batch_boolean([made[body] for body in outer], manifold3d.OpType.Add)
+        mesh = whole.to_mesh64()
+        return np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts).astype(np.int64)]
+
+    def _windings(self, body: int) -> Windings:
+        """Winding numbers of one body."""
+        return Windings(self.points[self.faces[self.labels == body]])
+
+
+def crossing_faces(points: Floats, faces: Ints, depths: Floats) -> Ints:
+    """Return (k, 2) pairs of faces that reach through each other by more than the (m,) depth of both."""
+    ids = same_positions(points)[faces]
+    pairs = overlapping_faces(points, ids, -depths)
+    shared = (ids[pairs[:, 0]][:, :, None] == ids[pairs[:, 1]][:, None]).sum(axis=(1, 2))
+    pairs = pairs[shared < 2]  # faces with a common edge may be folded, but not pass through each other
+    return pairs[_are_deep(points[faces].reshape(-1, 9), pairs, depths)]
+
+
+@compiled
+def _are_deep(corners: Floats, pairs: Ints, depths: Floats) -> Bools:
+    """Return (k,) whether pairs of triangles overlap by their depth, those with a common vertex as all others."""
+    result, ways = np.empty(len(pairs), dtype=np.bool_), np.empty((10, 3))
+    for k in range(len(pairs)):
+        f, g = pairs[k]
+        depth = min(depths[f], depths[g])
+        result[k] = overlap(corners[f], corners[g], -depth, depth, ways)
+    return result
+
+
+def whole_boundary(triangles: Floats, windings: Windings, mesh: TriangleMesh | None = None) -> Floats | None:
+    """Find (k, 3, 3) triangles that bound the solid of a chain; None if no way to cut it is proven.
+
+    `triangles` are those of a cut that is not, and `mesh` is the mesh that the chain was made of, if that is known.
+    """
+    found = (made for made in _candidates(triangles, windings, mesh) if made is not None)
+    return next((made for made in found if same_solid(made, windings)), None)
+
+
+def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None) -> Iterator[Floats | None]:
+    """Yield one boundary after the other."""
+    if mesh is not None:
+        bodies = Bodies.of_mesh(mesh, windings)
+        yield None if bodies is None else bodies.united
+    bodies = Bodies.of_chain(windings)
+    yield None if bodies is None else bodies.united
+    for chain in (triangles, windings.triangles):
+        if len(chain):
+            yield _coned(*_cut_again(chain, windings))
+
+
+def _cut_again(triangles: Floats, windings: Windings) -> tuple[Floats, Ints]:
+    """Divide triangles where they cross or end on each other; drop those that lie inside or cancel in pairs."""
+    points, faces = indexed(triangles)
+    slacks, every = tolerances(points, faces, SAME_POINT), np.ones(len(faces), dtype=bool)
+    pieces, regions = cut_and_sided(partial(arranged, points, faces, None), slacks, every, windings)
+    return pieces.points, without_doubles(pieces.faces[regions.bounds])
+
+
+def without_doubles(faces: Ints) -> Ints:
+    """Drop pairs of faces on the same vertices that face opposite ways, and faces on fewer than three vertices."""
+    first, reverse = coincident_faces(faces.ravel(), np.arange(0, faces.size + 1, 3))
+    proper = first >= 0
+    forth, back = (np.bincount(first[proper & (reverse == way)], minlength=len(faces)) for way in (False, True))
+    return faces[proper & ~((forth == 1) & (back == 1))[first]]
+
+
+def _coned(points: Floats, faces: Ints) -> Floats:
+    """Close triangles by cones from one vertex of each simple loop of their boundary."""
+    table = edge_table(faces)
+    ends = np.where((table.balance < 0)[:, None], table.vertices[:, ::-1], table.vertices)
+    fans = [fan(loop) for loop in _simple_loops(np.repeat(ends, np.abs(table.balance), axis=0))]
+    return points[np.concatenate([faces, *fans])]
+
+
+def _simple_loops(edges: Ints) -> Iterator[Ints]:
+    """Yield loops of directed edges (k, 2), against their direction, none of which passes a vertex twice.
+
+    As many edges end at each vertex as begin there.
+    """
+    onward: dict[int, list[int]] = {}
+    for tail, head in edges.tolist():
+        onward.setdefault(head, []).append(tail)
+    for start in onward:
+        path, places = [start], {start: 0}
+        while onward[path[-1]]:
+            vertex = onward[path[-1]].pop()
+            if vertex not in places:
+                places[vertex] = len(path)
+                path.append(vertex)
+                continue
+            loop = path[places[vertex] :]
+            if len(loop) > 2:
+                yield np.array(loop)
+            for passed in loop[1:]:
+                del places[passed]
+            del path[places[vertex] + 1 :]
+
+
+def same_solid(triangles: Floats, windings: Windings) -> bool:
+    """Whether triangles are closed and bound the solid of some winding numbers, up to rounding.
+
+    Triangles must be where the inside of the solid ends, and it must be behind each of them and not in front, at one of
+    the distances up to which a cut may merge points. Those that are wrong nevertheless, as two that cover each other,
+    must be so small that they cannot enclose `WRONG_VOLUME`: a surface of area A encloses at most A^1.5 / (6 √π).
+    """
+    points, faces = indexed(triangles)
+    if not len(faces) or (edge_table(faces).balance != 0).any():
+        return False
+    chosen = _spread(len(faces))
+    checked, widths = triangles[chosen], tolerances(points, faces, SAME_POINT)[chosen]
+    wrong = np.arange(len(chosen))
+    for multiple in TOLERANCES:
+        sides = Sides.of(checked[wrong], multiple * widths[wrong], windings)
+        wrong = wrong[sides.rows[~(sides.behind & ~sides.ahead)]]
+    parts = element_components(faces[chosen][wrong])
+    areas = np.bincount(parts, face_areas(checked[wrong])) * len(faces) / len(chosen)
+    corners = triangles - points.mean(axis=0)
+    volume = float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners))) / 3.0
+    if (areas**1.5).sum() / (6.0 * np.sqrt(np.pi)) > WRONG_VOLUME * volume:
+        return False
+    chosen = _spread(len(windings.triangles))
+    widths = TOLERANCES[-1] * tolerances(*indexed(windings.triangles), SAME_POINT)[chosen]
+    sides = Sides.of(halved(halved(windings.triangles[chosen])), np.tile(widths, 4), windings)
+    ends = sides.behind != sides.ahead
+    off = FaceTree.of_triangles(triangles).distances(sides.centres[ends]) if ends.any() else np.zeros(0)
+    return bool((off <= 2.0 * sides.steps[ends]).all())
+
+
+def _spread(count: int) -> Ints:
+    """Return at most `PROOF_SAMPLES` rows, evenly spread over all."""
+    return np.linspace(0, count - 1, min(count, PROOF_SAMPLES)).astype(np.int64)
+
+
+class Sides(NamedTuple):
+    """Whether the inside lies on both sides of those triangles that are wide enough to have clear sides."""
+
+    rows: Ints  # (k,) the triangles
+    centres: Floats  # (k, 3)
+    steps: Floats  # (k,) distances from the centres at which sides were taken
+    behind: Bools  # (k,) whether the inside is behind the centre
+    ahead: Bools  # (k,) and in front of it
+
+    @classmethod
+    def of(cls, triangles: Floats, steps: Floats, windings: Windings) -> Sides:
+        """Find sides at (m,) distances from (m, 3, 3) triangles."""
+        rows = np.flatnonzero(heights(triangles) > 2.0 * steps)
+        centres, away = triangles[rows].mean(axis=1), steps[rows, None] * unit(area_vectors(triangles[rows]))
+        return cls(rows, centres, steps[rows], windings.inside(centres - away), windings.inside(centres + away))
