@@ -191,7 +191,7 @@ CASES: dict[str, Callable[[], Floats]] = {
     "noisy points": lambda: solid(sh.PointCloud(samples.with_noise(BALL, 0.02, 0).vertices)),
     "lids": lambda: np.array([volume(shape) / whole for shape, whole in shapes().values()]),
     "sharp surface": lambda: solid(sh.complete(TWO_BOXES).surface(resolution=32)),
-    "kept faces": lambda: solid(sh.complete(open_boxes()).surface(keep_faces=True, resolution=32)),
+    "kept faces": lambda: solid(sh.complete(open_boxes()).surface()),
     "level, simplified": lambda: solid(sh.complete(BALL).surface(level=0.1, resolution=32, tolerance=0.01)),
     "opening": lambda: solid(morphology.opening(TWO_BOXES, 0.1, resolution=40)),
     "thickness, deviation, samples": checks,

@@ -144,7 +144,7 @@ DAMAGES: dict[str, Callable[[Mesh], Mesh]] = {
 
 
 def ours_kept(mesh: Mesh, cell: float) -> Mesh:
-    return sh.complete(mesh).surface(keep_faces=True, spacing=cell)
+    return sh.complete(mesh).surface()
 
 
 def ours_sharp(mesh: Mesh, cell: float) -> Mesh:
