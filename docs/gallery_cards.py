@@ -36,8 +36,10 @@ SIZE = 560, 400
 """Pixels of a card: twice as many as are shown, for fine screens."""
 WHITE = 250
 """Least value of a pixel that counts as empty."""
-BAR_WIDTH = 0.25
+BAR_WIDTH = 0.5
 """Width of a panel, relative to the widest, below which it is a colour bar or its numbers."""
+NARROW = 3
+"""Pixels of white that do not separate panels from what is beside them."""
 CARD = '<div class="sphx-glr-thumbcontainer"'
 
 
@@ -54,14 +56,14 @@ def bands(filled: NDArray[np.bool_], gap: int) -> list[tuple[int, int]]:
 def panel(image: NDArray[np.uint8], first: bool) -> NDArray[np.uint8]:
     """Cut the first or last panel out of a row of panels, without its title, its axis and its colour bar."""
     filled = (image < WHITE).any(axis=2)
-    columns = bands(filled.any(axis=0), image.shape[1] // 80)
+    quarter = len(filled) // 4  # titles, and numbers of axes, are above and below
+    columns = bands(filled[quarter:-quarter].any(axis=0), NARROW)
     widest = max(end - begin for begin, end in columns)
     wide = [(begin, end) for begin, end in columns if end - begin > BAR_WIDTH * widest]
     begin, end = wide[0 if first else -1]
     rows = bands(filled[:, begin:end].any(axis=1), 2)
     top, bottom = max(rows, key=lambda row: row[1] - row[0])
-    left, right = bands(filled[top:bottom, begin:end].any(axis=0), end - begin)[0]
-    return image[top:bottom, begin + left : begin + right]
+    return image[top:bottom, begin:end]
 
 
 def write_card(picture: Path, card: Path, first: bool) -> None:
