@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, ImageOps
 
 TRADES = {
     "Repair and printing": (
@@ -70,7 +70,7 @@ def write_card(picture: Path, card: Path, first: bool) -> None:
     """Write the card of a picture, white around what it shows."""
     with Image.open(picture) as opened:
         shown = Image.fromarray(panel(np.asarray(opened.convert("RGB")), first))
-    shown.thumbnail(SIZE, Image.Resampling.LANCZOS)
+    shown = ImageOps.contain(shown, SIZE, Image.Resampling.LANCZOS)
     whole = Image.new("RGB", SIZE, "white")
     whole.paste(shown, ((SIZE[0] - shown.width) // 2, (SIZE[1] - shown.height) // 2))
     whole.save(card)
