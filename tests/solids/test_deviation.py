@@ -86,7 +86,7 @@ def test_command(tmp_path, capsys):
     assert said["output"] == outputs and all(Path(each).exists() for each in outputs)
     assert main(words) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "within ±0.2: 100.00%" and len(lines) == 12 and lines[2].startswith("+0.1")
+    assert lines[1] == "within ±0.2: 100 %" and len(lines) == 12 and lines[2].startswith("+0.1")
 
 
 def test_the_worst_places_are_apart():

@@ -54,7 +54,7 @@ from .inputs import Input
 
 @dataclass(frozen=True)
 class Sampling:
-    """How to sample a shape (`signedheat.sample`) and store the samples (`Samples.save`).
+    """How to sample a shape (`sample_distances`) and store the samples (`Samples.save`).
 
     Attributes
     ----------

@@ -477,7 +477,7 @@ class Solid(Displayed, Represented, Frozen):
     def sample(
         self, n: int = 250_000, *, near: float = 0.8, widths: Sequence[float] = NOISE_WIDTHS, seed: int = 0
     ) -> Samples:
-        """Sample points with distances and gradients, near the surface and around it: see `signedheat.sample`.
+        """Sample points with distances and gradients, near the surface and around it: see `sample_distances`.
 
         Parameters
         ----------
