@@ -17,7 +17,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.io import files
+from signedheat.io import budgets
 from signedheat.view import save_scene
 
 resource = pytest.importorskip("resource", reason="limits and signals of POSIX")
@@ -268,7 +268,7 @@ def test_one_processor_and_more_threads_give_the_same_bits(tmp_path):
 
 def test_memory_that_is_not_free(tmp_path, monkeypatch):
     BALL.save(tmp_path / "ball.stl")
-    monkeypatch.setattr(files, "available_memory", lambda: 100)
+    monkeypatch.setattr(budgets, "available_memory", lambda: 100)
     with pytest.raises(sh.errors.MemoryLimitError):
         sh.read(tmp_path / "ball.stl")
 

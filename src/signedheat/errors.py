@@ -13,6 +13,21 @@ __all__ = [
     "UnreachedWarning", "UnsupportedTypeError",
 ]  # fmt: skip
 
+LONGEST_TEXT = 600
+"""Characters of a cause, a remedy, an element or a warning, which may quote names and contents of files."""
+
+
+def shortened(text: str) -> str:
+    """Put a text on one line, and cut it at `LONGEST_TEXT` characters.
+
+    Examples
+    --------
+    >>> len(shortened("no such\nname: " + 10_000 * "a"))
+    600
+    """
+    line = " ".join(text[: 2 * LONGEST_TEXT].split())
+    return line if len(line) <= LONGEST_TEXT and len(text) <= 2 * LONGEST_TEXT else f"{line[: LONGEST_TEXT - 1]}…"
+
 
 def printable(text: str) -> str:
     """Escape control characters, so that names and contents of files cannot control a terminal.
@@ -62,11 +77,11 @@ class SignedHeatError(ValueError):
         element: str | None = None,
         path: str | os.PathLike[str] | None = None,
     ) -> None:
-        cause = printable(" ".join(cause.split()))  # one line, even if it quotes several
+        cause = printable(shortened(cause))  # which may quote several lines
         super().__init__(cause)
         self.cause: str = cause
-        self.remedy: str | None = remedy
-        self.element: str | None = element
+        self.remedy: str | None = None if remedy is None else shortened(remedy)
+        self.element: str | None = None if element is None else shortened(element)
         self.path: str | None = None if path is None else str(path)
 
     def __str__(self) -> str:
@@ -216,4 +231,4 @@ def warn_user(message: str, category: type[Warning]) -> None:
     depth, frame = 1, inspect.currentframe()
     while frame and frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in within:
         frame, depth = frame.f_back, depth + 1
-    warnings.warn(printable(" ".join(message.split())), category, stacklevel=depth)
+    warnings.warn(printable(shortened(message)), category, stacklevel=depth)

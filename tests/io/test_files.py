@@ -21,7 +21,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.io import files
+from signedheat.io import budgets, files
 from signedheat.io.files import ensure_writable, replacing
 from signedheat.search import nearest_triangles as nearest
 
@@ -194,7 +194,7 @@ def test_no_more_is_unpacked_than_is_announced(tmp_path, ending):
 def test_what_is_announced_is_compared_with_the_memory_that_is_free(tmp_path, ending, monkeypatch):
     field = sh.GridField(sh.Grid([0, 0, 0], 1.0, [40, 40, 40]), np.zeros((40, 40, 40)))
     field.save(tmp_path / f"phi.{ending}")
-    monkeypatch.setattr(files, "available_memory", lambda: 8 * 40**3 - 1)
+    monkeypatch.setattr(budgets, "available_memory", lambda: 8 * 40**3 - 1)
     with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read_field(tmp_path / f"phi.{ending}")
     assert caught.value.remedy and caught.value.path

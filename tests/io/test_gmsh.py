@@ -93,7 +93,7 @@ def test_blocks_of_version_four_that_are_only_announced(tmp_path):
 
 def test_numbers_of_nodes_for_whose_table_there_is_no_memory(tmp_path, monkeypatch):
     """In text and in blocks of bytes; coordinates may be as large as they like."""
-    monkeypatch.setattr("signedheat.io.files.available_memory", lambda: 10**9)
+    monkeypatch.setattr("signedheat.io.budgets.available_memory", lambda: 10**9)
     (tmp_path / "odd.msh").write_bytes(FOUR.replace(b"\n40\n", b"\n855000000\n", 1))
     with refused(sh.errors.MemoryLimitError):
         sh.read(tmp_path / "odd.msh")

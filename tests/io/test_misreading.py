@@ -208,7 +208,7 @@ def test_gltf_announcements_are_not_believed(gltf, accessor):
 
 
 def test_gltf_instances_are_counted_before_they_are_made(gltf, monkeypatch):
-    monkeypatch.setattr("signedheat.io.files.available_memory", lambda: 10**6)
+    monkeypatch.setattr("signedheat.io.budgets.available_memory", lambda: 10**6)
     with refused(MemoryLimitError):
         gltf(nodes=[{"mesh": 0}] * 2000)
 

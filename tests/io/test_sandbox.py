@@ -13,7 +13,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat.errors import FileFormatError, MemoryLimitError, MissingPackageError
-from signedheat.io import parsers, sandbox
+from signedheat.io import budgets, parsers, sandbox
 
 HOSTILE = """
 def good(path, factor):
@@ -124,7 +124,7 @@ def test_whatever_a_parser_does_is_one_line(parse, function, kind):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no limit of processor time")
 def test_a_parser_without_an_end_is_stopped_by_its_processor_time(parse, monkeypatch):
-    monkeypatch.setattr(sandbox, "LEAST_SECONDS", 1)
+    monkeypatch.setattr(budgets, "LEAST_SECONDS", 1)
     with refused(FileFormatError) as caught:
         parse("hang")
     assert " 1 s " in caught.value.cause

@@ -182,7 +182,7 @@ def without_exponents(words: Iterable[str]) -> list[str]:
     >>> without_exponents(["offset", "-1e-3", "-2.5e1", "--quiet"])
     ['offset', '-0.001', '-25.0', '--quiet']
     """
-    is_number = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?", re.IGNORECASE).fullmatch
+    is_number = re.compile(r"-(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.IGNORECASE).fullmatch
     return [format(Decimal(repr(float(word))), "f") if is_number(word) else word for word in words]
 
 

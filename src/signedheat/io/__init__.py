@@ -1,5 +1,6 @@
 """Read and write shapes, curves and fields."""
 
+from .budgets import Budget
 from .curve_files import CURVE_FORMATS, read_curves, write_curves
 from .drawing_files import POLYLINE_FORMATS, read_polylines, write_polylines
 from .field_files import (
@@ -26,6 +27,7 @@ __all__ = [
     "TET_FIELD_FORMATS",
     "VALUE_FORMATS",
     "VERTEX_FIELD_FORMATS",
+    "Budget",
     "LabelImage",
     "ensure_field_writable",
     "ensure_writable",

@@ -21,8 +21,11 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface import closest_points
 from ..surfaces.surface_curves import Curve, CurveOrPoints, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import numbers
+from .budgets import JSON, charge_tree
 from .files import PathLike, format_for, reading, replacing, text
 from .mesh_files import read_obj_elements
+from .numerals import integer, integers
 from .point_files import read_point_lists
 
 GROUP_KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
@@ -233,11 +236,13 @@ def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple
 def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Curve]:
     """Read vertex ids and weights, or polylines in space, from JSON."""
     try:
-        content = json.loads(text(path))
+        written = text(path)
+        charge_tree(written, JSON)
+        content = json.loads(written)
         if "polylines" not in content:
             return groups_of(content)
         lines = [
-            (np.array(line["points"], dtype=np.float64), bool(line.get("closed", False)))
+            (numbers(line["points"], "points", FileFormatError), bool(line.get("closed", False)))
             for line in content["polylines"]
         ]
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
@@ -249,17 +254,21 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
 
 def groups_of(content: dict[str, Any]) -> list[Group]:
     """Parse curves and points that are given by vertex ids and weights."""
-    base, groups = int(content.get("index_base", 0)), []
+    base, groups = integer(content.get("index_base", 0), "index_base"), []
     for group in content["groups"]:
         nodes = [
-            Node(tuple(int(v) - base for v in node["v"]), tuple(float(w) for w in node["w"])) for node in group["nodes"]
+            Node(
+                tuple((integers(node["v"], "vertex ids", 0) - base).tolist()),
+                tuple(numbers(node["w"], "weights", FileFormatError).tolist()),
+            )
+            for node in group["nodes"]
         ]
         if any(len(n.vertices) != len(n.weights) or not 0 < len(n.vertices) <= 3 for n in nodes):
             raise ValueError("a node needs one to three vertices and as many weights")
         if group["kind"] == POINTS:
             groups.append(Group(POINTS, nodes))
         elif group["kind"] in (SIGNED, UNSIGNED):
-            segments = [(int(i), int(j)) for i, j in group["segments"]]
+            segments = [(i, j) for i, j in (integers(pair, "segments", 0).tolist() for pair in group["segments"])]
             groups += polylines_of_segments(group["kind"], nodes, segments)
         else:
             raise ValueError(f"the kind '{group['kind']}' is none of {SIGNED}, {UNSIGNED}, {POINTS}")

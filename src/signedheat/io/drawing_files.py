@@ -6,7 +6,7 @@ import cmath
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from xml.etree import ElementTree
 
@@ -16,12 +16,13 @@ from ..arrays import Complexes, Floats
 from ..errors import FileFormatError, GeometryError
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
+from .budgets import XML, charge, charge_tree
 from .files import PathLike, contents, damaged, format_for, reading, replacing
 from .point_files import read_point_lists, write_point_lists
 
 CURVE_PIECES = 64
 """Number of segments that approximate a Bézier curve or an arc."""
-NUMBER = re.compile(r"[\s,]*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
 FLAG = re.compile(r"[\s,]*([01])")
 COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])")
 ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
@@ -29,23 +30,28 @@ ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A"
 SVG_UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
 """User units per unit of length; ems are those of the default font."""
 SVG_UNITS |= {"em": 16.0, "ex": 8.0}
+MOST_DEPTH = 100
+"""Largest depth of nested elements of a drawing."""
 CONTAINERS = ("svg", "g", "a", "switch")
 PLACED = {"svg": ("viewBox", "x", "y"), "symbol": ("viewBox",)}
 """Attributes that give a drawing within a drawing coordinates of its own, by the name of its element."""
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
 """Axis, 0 or 1, of each attribute that is a length along x or y."""
-FILL_RULE = re.compile(r"fill-rule\s*:\s*(\w+)")
-TRANSFORM = re.compile(r"(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^)]*)\)")
+BYTES_PER_CURVE_POINT = 64
+"""Memory for a point of a line while a drawing is read."""
 
 
 def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
     """Read the points of each subpath, in drawing order with y upwards, and whether it is closed."""
     data = contents(path)
+    charge_tree(data, XML)
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
         raise damaged(f"it is not XML ({error})") from error
-    drawing = _Drawing({key: element for element in root.iter() if (key := element.get("id")) is not None}, _size(root))
+    named = {key: element for element in root.iter() if (key := element.get("id")) is not None}
+    drawing = _Drawing(named, _size(root))
+    charge(elements=sum(map(drawing.n_used, _uses(root))))
     lines = [line for part in drawing.drawn(root, np.eye(3)) for line in part]
     if not lines:
         raise FileFormatError("the drawing contains no lines", remedy="convert text and images to paths first")
@@ -58,38 +64,62 @@ class _Drawing:
 
     named: dict[str, ElementTree.Element]
     size: tuple[float, float]
-    n_used: int = 0
+    counts: dict[ElementTree.Element, int] = field(default_factory=dict)
+    parts: dict[tuple[ElementTree.Element, str], list[tuple[Floats, bool]]] = field(default_factory=dict)
 
     def drawn(
         self, element: ElementTree.Element, outer: Floats, depth: int = 0, is_used: bool = False, rule: str = "nonzero"
     ) -> Iterator[list[tuple[Floats, bool]]]:
         """Yield the subpaths of an element and its children; with the evenodd rule, outlines of what they fill."""
-        self.n_used += is_used
-        if depth > 100 or self.n_used > 10**5:
-            raise damaged("its elements contain themselves or too many others")
-        kind = str(element.tag).rpartition("}")[2]
-        if element.get("display") == "none" or "display:none" in element.get("style", "").replace(" ", ""):
+        if depth > MOST_DEPTH:
+            raise damaged(f"its elements lie more than {MOST_DEPTH} levels deep, or contain themselves")
+        kind = _kind(element)
+        style = _declared(element.get("style", ""))
+        if "none" in (element.get("display"), style.get("display")):
             return
         matrix = outer @ _transform(element.get("transform", ""))
-        stated = FILL_RULE.search(element.get("style", ""))
-        rule = stated[1] if stated else element.get("fill-rule", rule)
+        rule = style.get("fill-rule") or element.get("fill-rule") or rule
         if kind in CONTAINERS or (kind == "symbol" and is_used):
             if depth and any(name in element.attrib for name in PLACED.get(kind, ())):
                 raise FileFormatError(f"a {kind} in it has coordinates of its own", remedy="turn it into paths first")
             for child in element:
                 yield from self.drawn(child, matrix, depth + 1, is_used, rule)
         elif kind == "use":
-            name = next((value for key, value in element.attrib.items() if key.rpartition("}")[2] == "href"), "")
-            if name[1:] in self.named:
+            target = self._target(element)
+            if target is not None:
                 move = np.eye(3)
                 move[:2, 2] = self._length(element, "x"), self._length(element, "y")
-                yield from self.drawn(self.named[name[1:]], matrix @ move, depth + 1, True, rule)
+                yield from self.drawn(target, matrix @ move, depth + 1, True, rule)
         else:
-            parts = list(_subpaths(self._path(element, kind)))
-            if rule == "evenodd" and any(closed for _, closed in parts):
-                filled = filled_outlines([points for points, closed in parts if closed], "evenodd")
-                parts = [*((outline[::-1], True) for outline in filled), *(part for part in parts if not part[1])]
+            if (element, rule) not in self.parts:
+                self.parts[element, rule] = self._parts(self._path(element, kind), rule)
+            parts = self.parts[element, rule]
+            made = sum(len(points) for points, _ in parts)
+            charge(BYTES_PER_CURVE_POINT * made, points=made * is_used)
             yield [(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in parts]
+
+    def n_used(self, element: ElementTree.Element, depth: int = 0) -> int:
+        """Count what is drawn where an element is used: itself, what is in it, and what these use."""
+        if element not in self.counts:
+            if depth > MOST_DEPTH:
+                raise damaged(f"its elements lie more than {MOST_DEPTH} levels deep, or contain themselves")
+            target = self._target(element) if _kind(element) == "use" else None
+            inner = [*element, *([] if target is None else [target])]
+            self.counts[element] = 1 + sum(self.n_used(each, depth + 1) for each in inner)
+        return self.counts[element]
+
+    def _target(self, element: ElementTree.Element) -> ElementTree.Element | None:
+        """Return what a ``<use>`` names."""
+        name = next((value for key, value in element.attrib.items() if key.rpartition("}")[2] == "href"), "")
+        return self.named.get(name[1:])
+
+    def _parts(self, data: str, rule: str) -> list[tuple[Floats, bool]]:
+        """Return the subpaths of path data, or with the evenodd rule the outlines of what they fill."""
+        parts = list(_subpaths(data))
+        if rule != "evenodd" or not any(closed for _, closed in parts):
+            return parts
+        filled = filled_outlines([points for points, closed in parts if closed], "evenodd")
+        return [*((outline[::-1], True) for outline in filled), *(part for part in parts if not part[1])]
 
     def _path(self, element: ElementTree.Element, kind: str) -> str:
         """Return the path data of an element; circles and ellipses run clockwise in the drawing."""
@@ -124,6 +154,22 @@ class _Drawing:
         return length(element.get(name, "0"), whole, name)
 
 
+def _uses(root: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    """Return what uses others in a drawing, without what is only defined in it."""
+    waiting = [root]
+    while waiting:
+        element = waiting.pop()
+        if _kind(element) == "use":
+            yield element
+        elif _kind(element) in CONTAINERS:
+            waiting += element
+
+
+def _kind(element: ElementTree.Element) -> str:
+    """Return the name of an element without its namespace."""
+    return str(element.tag).rpartition("}")[2]
+
+
 def length(word: str, whole: float = math.nan, name: str = "length") -> float:
     """Return a length in user units, 96 of which are an inch.
 
@@ -144,9 +190,27 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
     return value
 
 
+def _declared(style: str) -> dict[str, str]:
+    """Return the declarations in a ``style`` attribute by name, in lower case."""
+    pairs = (declaration.partition(":") for declaration in style.lower().split(";"))
+    return {name.strip(): value.replace("!important", "").strip() for name, _, value in pairs}
+
+
+def _numbers(text: str, name: str) -> list[float]:
+    """Return the numbers in an attribute, which spaces, commas or only signs separate."""
+    numbers, position, end = [], 0, len(text.rstrip(" \t\r\n,"))
+    while position < end:
+        match = NUMBER.match(text, position)
+        if match is None:
+            raise damaged(f"{name} has '{text[position : position + 20].strip()}' where a number must be", element=name)
+        numbers.append(float(match[1]))
+        position = match.end()
+    return numbers
+
+
 def _size(root: ElementTree.Element) -> tuple[float, float]:
     """Return the width and height of a drawing in user units; NaN where they are not given."""
-    box = [float(word) for word in NUMBER.findall(root.get("viewBox", ""))]
+    box = _numbers(root.get("viewBox", ""), "viewBox")
     if len(box) == 4:
         return box[2], box[3]
     sides = (root.get(name, "100%") for name in ("width", "height"))
@@ -157,8 +221,10 @@ def _size(root: ElementTree.Element) -> tuple[float, float]:
 def _transform(text: str) -> Floats:
     """Return the product of a list of transforms in an attribute, as a (3, 3) matrix."""
     matrix = np.eye(3)
-    for kind, inside in TRANSFORM.findall(text):
-        numbers = [float(word) for word in NUMBER.findall(inside)]
+    *steps, rest = text.split(")")
+    for written in (*steps, *([rest] if rest.strip() else [])):
+        kind, _, inside = written.partition("(")
+        kind, numbers = kind.strip(" \t\r\n,"), _numbers(inside, "transform")
         step = np.eye(3)
         if kind == "matrix" and len(numbers) == 6:
             step[:2] = np.reshape(numbers, (3, 2)).T
@@ -171,10 +237,10 @@ def _transform(text: str) -> Floats:
             step[:2, :2] = [[cos, -sin], [sin, cos]]
             center = np.array(numbers[1:] or (0.0, 0.0))
             step[:2, 2] = center - step[:2, :2] @ center
-        elif kind.startswith("skew") and numbers:
+        elif kind in ("skewX", "skewY") and numbers:
             step[(0, 1) if kind == "skewX" else (1, 0)] = math.tan(math.radians(numbers[0]))
         else:
-            raise damaged(f"'{kind}({inside[:40]})' is not a transform")
+            raise damaged(f"'{written:.40}' is not a transform", element="transform")
         matrix = matrix @ step
     return matrix
 

@@ -16,18 +16,17 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from traceback import walk_tb
-from typing import Any, BinaryIO, TypeVar
+from typing import BinaryIO, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, UnsupportedTypeError
-from ..memory import available_memory
+from .budgets import account, charge
 
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 PACKAGE = f"{__package__.partition('.')[0]}."
-BYTES_PER_FILE_BYTE = {".off": 14, ".stl": 5, ".xyz": 4, ".ply": 2}
+BYTES_PER_FILE_BYTE = {".stl": 5, ".ply": 2}
 """Measured memory to read a shape per byte of its file, reduced for formats that hold more than positions and faces.
 For other formats, readers estimate memory from the first parts of the file."""
 READING_MODULES = f"{__package__}.", f"{PACKAGE}packages"
@@ -81,9 +80,12 @@ def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileForm
 
 @contextmanager
 def reading(path: PathLike) -> Iterator[None]:
-    """Turn exceptions of parsers into errors that name the file; unexpected ones of other code of this package pass."""
+    """Turn exceptions of parsers into errors that name the file; unexpected ones of other code of this package pass.
+
+    What is read within it is charged to the budget of the file.
+    """
     try:
-        with np.errstate(all="ignore"):  # no warnings: shapes and fields check their values themselves
+        with account(path), np.errstate(all="ignore"):  # no warnings: shapes and fields check their values themselves
             yield
     except SignedHeatError as error:
         if error.path is not None:
@@ -111,8 +113,8 @@ def _is_ours(error: BaseException) -> bool:
 
 def contents(path: PathLike) -> bytes:
     """Return the bytes of a file."""
-    with _opened(path) as (file, size):
-        ensure_fits(BYTES_PER_FILE_BYTE.get(extension(path), 1) * size, path)
+    with _opened(path) as (file, size), account(path):
+        charge(bytes=BYTES_PER_FILE_BYTE.get(extension(path), 1) * size)
         data = file.read()
     if not data:
         raise FileFormatError("the file is empty", remedy="write or download it again", path=path)
@@ -164,17 +166,6 @@ def companion_contents(path: PathLike, name: str) -> bytes:
     return contents(named)
 
 
-def ensure_fits(size: int, path: PathLike) -> None:
-    """Raise `MemoryLimitError` if less than `size` bytes of memory are free, before they are allocated."""
-    free = available_memory()
-    if free is not None and size > free:
-        raise MemoryLimitError(
-            f"reading it takes about {size / 1e9:.3g} GB of memory, and {free / 1e9:.3g} GB are free",
-            remedy="check that it is not damaged, or free some memory",
-            path=path,
-        )
-
-
 def _no_file(path: PathLike, mode: int) -> FileFormatError:
     """Return the error for a path to something other than a regular file, as its mode tells."""
     kinds = ((stat.S_ISDIR, "folder"), (stat.S_ISFIFO, "pipe"), (stat.S_ISSOCK, "socket"))
@@ -185,6 +176,7 @@ def _no_file(path: PathLike, mode: int) -> FileFormatError:
 def text(path: PathLike) -> str:
     r"""Read a file as UTF-8, or UTF-16 with a byte order mark, with lines that end in ``\n``."""
     data = contents(path)
+    charge(bytes=3 * len(data))  # decoded, and with other ends of lines
     encoding = "utf-16" if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8-sig"
     return data.decode(encoding, errors="replace").replace("\r\n", "\n").replace("\r", "\n")
 
@@ -266,11 +258,3 @@ def writing(path: PathLike) -> Iterator[None]:
             remedy="choose an existing folder that is writable and has free space",
             path=path,
         ) from error
-
-
-def parsed_numbers(tokens: list[Any], what: str, kind: type = float) -> NDArray[Any]:
-    """Convert words of a text file to an array of numbers."""
-    try:
-        return np.array(tokens, dtype=np.float64 if kind is float else np.int64)
-    except (ValueError, OverflowError) as error:
-        raise damaged(f"{what} are not all numbers ({error}): the file is damaged") from error

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..transforms import Body, placed
-from .files import PathLike, companion_contents, contents, damaged, ensure_fits
+from .budgets import BYTES_PER_PLACED, JSON, charge, charge_tree
+from .files import PathLike, companion_contents, contents, damaged
+from .numerals import integer, integers
 
 COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """Types of the components of accessors."""
@@ -40,10 +42,11 @@ def read_bodies(path: PathLike) -> list[Body]:
             element=missing[0],
         )
     places = list(_places(scene.tree))
-    meshes = scene.tree.get("meshes", [])
-    sizes = {mesh: _size(scene.tree, meshes[mesh]) for mesh in {mesh for mesh, _ in places}}
-    ensure_fits(sum(sizes[mesh] for mesh, _ in places), path)
-    bodies = {mesh: [scene.body(primitive) for primitive in meshes[mesh]["primitives"]] for mesh in sizes}
+    meshes = {mesh: _named(scene.tree, "meshes", mesh)["primitives"] for mesh in dict.fromkeys(m for m, _ in places)}
+    sizes = {mesh: sum(scene.size(primitive) for primitive in primitives) for mesh, primitives in meshes.items()}
+    made = sum(sizes.values()) + sum(sizes[mesh] for mesh, _ in places)
+    charge(BYTES_PER_PLACED * made, sum(len(meshes[mesh]) for mesh, _ in places), made)
+    bodies = {mesh: [scene.body(primitive) for primitive in primitives] for mesh, primitives in meshes.items()}
     return [placed(body, matrix) for mesh, matrix in places for body in bodies[mesh] if len(body[1])]
 
 
@@ -54,31 +57,40 @@ class _Scene:
     tree: dict[str, Any]
     buffers: list[bytes]
 
+    def size(self, primitive: dict[str, Any]) -> int:
+        """Return the number of vertices and triangles of a primitive that its accessors announce, or more."""
+        named = primitive["attributes"].get("POSITION"), primitive.get("indices")
+        counts = [self.count(index) for index in named if index is not None]
+        per_triangle = 3 if _mode(primitive) == TRIANGLE_MODE else 1
+        return counts[0] + counts[-1] // per_triangle if counts else 0
+
     def body(self, primitive: dict[str, Any]) -> Body:
         """Return the vertices and triangles of a primitive, without unused vertices; points and lines have none."""
-        mode = primitive.get("mode", TRIANGLE_MODE)
-        if mode not in range(FAN_MODE + 1):
-            raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")
+        mode = _mode(primitive)
         if mode < TRIANGLE_MODE or "POSITION" not in primitive["attributes"]:
             return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
         points = self.numbers(primitive["attributes"]["POSITION"]).astype(np.float64)
         if points.shape[1] != 3:
             raise damaged(f"positions have {points.shape[1]} coordinates")
         accessor = primitive.get("indices")
-        corners = np.arange(len(points)) if accessor is None else self.numbers(accessor).ravel().astype(np.int64)
+        corners = np.arange(len(points)) if accessor is None else integers(self.numbers(accessor), "indices", 0).ravel()
         faces = _triangles(corners, mode)
         if len(faces) and faces.max() >= len(points):
             raise damaged(f"a face names vertex {faces.max()}, and there are {len(points)}")
         used = np.unique(faces)
         return points[used], np.searchsorted(used, faces)
 
-    def numbers(self, index: int) -> NDArray[Any]:
-        """Return the (count, width) numbers of an accessor; normalized integers become fractions."""
-        accessor = self.tree["accessors"][index]
-        count, width = int(accessor["count"]), COMPONENT_COUNTS[accessor["type"]]
-        dtype = np.dtype(COMPONENT_TYPES[accessor["componentType"]])
-        if not 0 < count <= sum(map(len, self.buffers)):
+    def count(self, index: object) -> int:
+        """Return how many numbers or vectors an accessor announces, which are no more than there are bytes."""
+        count = integer(_named(self.tree, "accessors", index)["count"], "count", 1)
+        if count > sum(map(len, self.buffers)):
             raise damaged(f"accessor {index} announces {count} numbers, which the file does not have")
+        return count
+
+    def numbers(self, index: object) -> NDArray[Any]:
+        """Return the (count, width) numbers of an accessor; normalized integers become fractions."""
+        accessor, count = _named(self.tree, "accessors", index), self.count(index)
+        width, dtype = COMPONENT_COUNTS[accessor["type"]], np.dtype(COMPONENT_TYPES[accessor["componentType"]])
         if "bufferView" in accessor:
             values = self._viewed(accessor, dtype, count, width)
         else:
@@ -86,20 +98,23 @@ class _Scene:
         if "sparse" in accessor:
             sparse, values = accessor["sparse"], values.copy()
             code = np.dtype(COMPONENT_TYPES[sparse["indices"]["componentType"]])
-            places = self._viewed(sparse["indices"], code, sparse["count"], 1).ravel()
-            values[places] = self._viewed(sparse["values"], dtype, sparse["count"], width)
+            changed = integer(sparse["count"], "count", 1)
+            places = integers(self._viewed(sparse["indices"], code, changed, 1), "sparse indices", 0).ravel()
+            values[places] = self._viewed(sparse["values"], dtype, changed, width)
         if accessor.get("normalized") and dtype.kind in "iu":
             return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
         return values
 
     def _viewed(self, part: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Return (count, width) numbers in a view of a buffer."""
-        view = self.tree["bufferViews"][part["bufferView"]]
-        buffer, begin, length = self.buffers[view["buffer"]], view.get("byteOffset", 0), view["byteLength"]
-        start, row = begin + part.get("byteOffset", 0), width * dtype.itemsize
-        stride = view.get("byteStride", row)
+        view = _named(self.tree, "bufferViews", part["bufferView"])
+        number, row = integer(view["buffer"], "buffer"), width * dtype.itemsize
+        if number >= len(self.buffers):
+            raise damaged(f"there is no buffer {number}", element=f"buffer {number}")
+        buffer, begin, length = self.buffers[number], _integer(view, "byteOffset", 0), _integer(view, "byteLength")
+        start, stride = begin + _integer(part, "byteOffset", 0), _integer(view, "byteStride", row)
         end = start + (count - 1) * stride + row
-        if min(begin, length, part.get("byteOffset", 0), count - 1) < 0 or stride < row or end > begin + length:
+        if stride < row or end > begin + length:
             raise damaged(f"{count} numbers go beyond their part of the buffer")
         if end > len(buffer):
             raise damaged(f"{end} bytes of a buffer are needed, and there are {len(buffer)}: it may be truncated")
@@ -120,22 +135,41 @@ def _read_scene(path: PathLike) -> _Scene:
         json_end = 20 + int.from_bytes(data[12:16], "little")
         text = data[20:json_end]
         embedded = data[json_end + 8 : json_end + 8 + int.from_bytes(data[json_end : json_end + 4], "little")]
+    charge_tree(text, JSON)
     tree = json.loads(text.decode("utf-8-sig"))
     version = str(tree.get("asset", {}).get("version", "2.0"))
     if not version.startswith("2."):
         raise FileFormatError(
             f"it is glTF {version}, and only glTF 2 can be read", remedy="export it as glTF 2.0", element="version"
         )
-    buffers = []
-    for buffer in tree.get("buffers", []):
-        uri = buffer.get("uri")
-        if uri is None:
-            buffers.append(embedded)
-        elif uri.startswith("data:"):
-            buffers.append(base64.b64decode(uri.partition(",")[2]))
-        else:
-            buffers.append(companion_contents(path, unquote(uri)))
-    return _Scene(tree, buffers)
+    buffers: dict[str | None, bytes] = {None: embedded}
+    uris = [buffer.get("uri") for buffer in tree.get("buffers", [])]
+    for uri in dict.fromkeys(uris):  # several buffers may be one file
+        if uri is not None:
+            named = uri.startswith("data:")
+            buffers[uri] = base64.b64decode(uri.partition(",")[2]) if named else companion_contents(path, unquote(uri))
+    return _Scene(tree, [buffers[uri] for uri in uris])
+
+
+def _named(tree: dict[str, Any], kind: str, index: object) -> dict[str, Any]:
+    """Return an entry of a list of the scene by its index, which must exist."""
+    entries, number = tree.get(kind, []), integer(index, f"index of {kind}")
+    if number >= len(entries):
+        raise damaged(f"it names number {number} of its {len(entries)} {kind}", element=f"{kind} {number}")
+    return entries[number]
+
+
+def _mode(primitive: dict[str, Any]) -> int:
+    """Return how the corners of a primitive form triangles."""
+    mode = integer(primitive.get("mode", TRIANGLE_MODE), "mode")
+    if mode > FAN_MODE:
+        raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")
+    return mode
+
+
+def _integer(part: dict[str, Any], name: str, default: int | None = None) -> int:
+    """Return an integer of a part of the scene that is not negative."""
+    return integer(part.get(name, default), name)
 
 
 def _triangles(corners: Ints, mode: int) -> Ints:
@@ -153,37 +187,27 @@ def _triangles(corners: Ints, mode: int) -> Ints:
     return faces[distinct]  # strips are joined by triangles with equal corners
 
 
-def _size(tree: dict[str, Any], mesh: dict[str, Any]) -> int:
-    """Estimate the bytes that a mesh takes while it is read, from the numbers that its accessors announce."""
-    size = 0
-    for part in mesh["primitives"]:
-        points = part["attributes"].get("POSITION")
-        counts = [tree["accessors"][index]["count"] for index in (points, part.get("indices")) if index is not None]
-        corners = counts[-1] if counts else 0
-        per_triangle = 3 if part.get("mode", TRIANGLE_MODE) == TRIANGLE_MODE else 1
-        size += 60 * min(counts, default=0) + 70 * (corners // per_triangle)  # measured, for a vertex and a triangle
-    return size
-
-
 def _places(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
     """Yield the number of each mesh and the (4, 3) transform of rows that places it; each node must occur only once."""
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
     if not nodes:
         yield from ((mesh, np.eye(4, 3)) for mesh in range(len(tree.get("meshes", []))))
         return
-    children = {child for node in nodes for child in node.get("children", [])}
-    roots = scenes[tree.get("scene", 0)].get("nodes", []) if scenes else set(range(len(nodes))) - children
+    below = [integers(node["children"], "children", 0).tolist() if "children" in node else [] for node in nodes]
+    roots = set(range(len(nodes))).difference(*below)
+    if scenes:
+        roots = set(integers(_named(tree, "scenes", tree.get("scene", 0)).get("nodes", []), "nodes", 0).tolist())
     stack = [(index, np.eye(4)) for index in sorted(roots)]
     visited = set()
     while stack:
         index, outer = stack.pop()
-        if index in visited or not 0 <= index < len(nodes):
+        if index in visited or index >= len(nodes):
             raise damaged(f"node {index} is part of two others or does not exist", element=f"node {index}")
         visited.add(index)
         matrix = outer @ _matrix(nodes[index])
         if "mesh" in nodes[index]:
-            yield nodes[index]["mesh"], matrix.T[:, :3]
-        stack += [(child, matrix) for child in reversed(nodes[index].get("children", []))]
+            yield integer(nodes[index]["mesh"], "mesh"), matrix.T[:, :3]
+        stack += [(child, matrix) for child in reversed(below[index])]
 
 
 def _matrix(node: dict[str, Any]) -> Floats:

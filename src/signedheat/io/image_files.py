@@ -10,7 +10,6 @@ import gzip
 import io
 import json
 import math
-import re
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,16 +21,16 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..errors import FileFormatError
 from ..packages import lazy_module
+from .budgets import JSON, charge, charge_tree, charge_words
 from .files import (
     PathLike,
     companion_contents,
     contents,
     damaged,
-    ensure_fits,
     format_for,
-    parsed_numbers,
     reading,
 )
+from .numerals import integer, integers, parsed_numbers
 from .numpy_files import read_npy, read_npz
 from .sandbox import parsed
 from .vtk_xml import read_vti
@@ -62,6 +61,9 @@ _CODES = {
     for name in names.split(",")
 }
 
+COPIES = 2
+"""Times that the values of an image are held while they are read, and again while they are checked: measured."""
+
 
 @dataclass(frozen=True, eq=False)
 class Image:
@@ -87,6 +89,7 @@ def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
     read = format_for(path, {ending: IMAGE_READERS[ending] for ending in formats}, purpose)
     with reading(path):
         image = read(path)
+        charge(bytes=COPIES * image.values.nbytes)
         if image.values.dtype.kind not in "biuf":
             raise FileFormatError(f"the values are not real numbers but {image.values.dtype}: this is not an image")
         return image
@@ -104,8 +107,9 @@ def _read_npy(path: PathLike) -> Image:
     values, companion = read_npy(path), Path(path).with_suffix(".json")
     if not companion.exists():
         return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))
-    text = contents(companion)
     with reading(companion):
+        text = contents(companion)
+        charge_tree(text, JSON)
         about = json.loads(text)
         return _aligned(values, about["origin"], about["spacing"])
 
@@ -128,18 +132,19 @@ def _read_nrrd(path: PathLike) -> Image:
         if companion.startswith("LIST") or "%" in companion:
             raise FileFormatError("its data are in several files", remedy="save it as one")
         rest = companion_contents(path, companion)
-    sizes = parsed_numbers(header["sizes"].split(), "sizes", int).tolist()
+    sizes = integers(header["sizes"].split(), "sizes").tolist()
     code = _CODES.get(header["type"].lower())
     if code is None or [str(len(sizes))] != header["dimension"].split() or min(sizes, default=0) < 1:
         raise damaged(
             f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} do not describe an image"
         )
     dtype = np.dtype(code).newbyteorder(">" if header.get("endian") == "big" else "<")
-    for _ in range(int(header.get("line skip", 0))):
-        rest = rest.partition(b"\n")[2]
-        if not rest:
-            break
-    values = _nrrd_values(rest, header, math.prod(sizes), dtype, path).reshape(sizes, order="F")
+    begin, lines = 0, integer(header.get("line skip", "0"), "line skip")
+    if lines > rest.count(b"\n"):
+        raise _truncated(rest.count(b"\n"), lines)
+    for _ in range(lines):
+        begin = rest.index(b"\n", begin) + 1
+    values = _nrrd_values(rest[begin:], header, math.prod(sizes), dtype).reshape(sizes, order="F")
     spacings = np.nan_to_num(parsed_numbers(header.get("spacings", "1 " * values.ndim).split(), "spacings"), nan=1.0)
     steps = _nrrd_vectors(header["space directions"]) if "space directions" in header else np.diag(spacings)
     origin = _nrrd_vectors(header.get("space origin", f"({','.join('0' * values.ndim)})"))[0]
@@ -164,22 +169,25 @@ def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
 
 def _nrrd_vectors(text: str) -> Floats:
     """Parse (n, d) vectors like ``(1,0,0) (0,1,0)``; the word ``none``, for axes outside of space, gives NaN."""
-    words = re.findall(r"\([^)]*\)|none", text)
-    rows = [[math.nan] if word == "none" else word.strip("()").split(",") for word in words]
+    rows = [part.strip(" (").split(",") for part in text.replace("none", "(nan)").split(")")[:-1]]
+    if not rows:
+        raise damaged(f"'{text:.40}' are no vectors")
     width = max(map(len, rows))
-    return parsed_numbers([row if len(row) == width else width * [math.nan] for row in rows], "vectors")
+    return parsed_numbers([row if len(row) == width else width * ["nan"] for row in rows], "vectors")
 
 
-def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any], path: PathLike) -> NDArray[Any]:
+def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return the first `count` values of the data, which are encoded as the header says."""
     encoding, size = header["encoding"].lower(), count * dtype.itemsize
-    skip = int(header.get("byte skip", 0))
+    skip = integer(header.get("byte skip", "0"), "byte skip", -1)
     if encoding in ("ascii", "text", "txt"):
+        charge_words(data)
         words = data[max(skip, 0) :].split()
         if len(words) < count:
             raise _truncated(len(words), count)
         return parsed_numbers(words[:count], "values").astype(dtype.newbyteorder("="))
-    ensure_fits(size, path)
+    packed = encoding in ("gzip", "gz", "bzip2", "bz2")
+    charge(bytes=COPIES * size + packed * (size + max(skip, 0)))
     if encoding in ("gzip", "gz"):
         data = gzip.GzipFile(fileobj=io.BytesIO(data)).read(size + max(skip, 0))
     elif encoding in ("bzip2", "bz2"):

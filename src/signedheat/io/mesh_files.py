@@ -17,7 +17,9 @@ from ..exchange import Elements
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import distinct_rows, same_positions
 from ..surfaces.triangle_mesh import TriangleMesh
-from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers, reading, refuse_kind, text
+from .budgets import charge_words
+from .files import PathLike, contents, damaged, reading, refuse_kind, text
+from .numerals import integer, integers, parsed_numbers
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 KEYWORDS = frozenset(
@@ -82,6 +84,7 @@ def warn_of_rounding(points: Floats, rounded: Floats) -> None:
 def _text_corners(data: bytes) -> Floats:
     """Return the corners, (3 m, 3), of the m facets of all solids in STL text; each facet must have three."""
     ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
+    charge_words(data)
     words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may hold keywords
     places: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
     for place, word in enumerate(words):
@@ -168,7 +171,7 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
     """Return lines as lists of words, by keyword; in each, the number of vertices so far replaces the keyword."""
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
-    ensure_fits(400 * sum(content.count(f"\n{keyword} ") for keyword in lines), path)  # bytes for each line, measured
+    charge_words(content)
     for number, line in enumerate(re.sub(r"\\[ \t]*\n", " ", content).split("\n"), start=1):
         words: list[Any] = line.partition("#")[0].split()
         if words and words[0] in lines:
@@ -200,7 +203,7 @@ def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
         flat = [word.partition("/")[0] for word in flat]
-    ids = parsed_numbers(flat, "vertex ids", int)
+    ids = integers(flat, "vertex ids")
     if (ids == 0).any():
         raise damaged("a face names vertex 0, but OBJ counts from 1: the file is damaged")
     before = np.array([element[0] for element in words], dtype=np.int64)
@@ -209,7 +212,9 @@ def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
 
 def read_off(path: PathLike) -> Elements:
     """Read the faces of an OFF file (also COFF, NOFF, STOFF, …), or its points if there are none."""
-    rows = [row for line in text(path).split("\n") if (row := line.partition("#")[0].split())]
+    content = text(path)
+    charge_words(content)
+    rows = [row for line in content.split("\n") if (row := line.partition("#")[0].split())]
     kind = rows[0][0].upper() if rows else ""
     if not kind.endswith("OFF") or "BINARY" in [word.upper() for word in rows[0]]:
         raise FileFormatError("it does not begin with OFF, so it is not an OFF file in text form")
@@ -221,9 +226,9 @@ def read_off(path: PathLike) -> Elements:
     rows = rows if rows[0] else rows[1:]
     if not rows or len(rows[0]) < 2:
         raise damaged("the numbers of vertices and faces are missing: it may be truncated")
-    n_vertices, n_faces = parsed_numbers(rows[0][:2], "counts", int).tolist()
-    if n_vertices < 0 or n_faces < 0:
-        raise damaged(f"{n_vertices} vertices and {n_faces} faces are announced: the file is damaged")
+    n_vertices, n_faces, *_ = (
+        integer(word, f"number of {what}") for word, what in zip(rows[0], ("vertices", "faces", "edges"), strict=False)
+    )
     lines = iter(rows[1:])
     vertex_rows = list(islice(_records(lines, lambda row: 3), n_vertices))
     face_rows = list(islice(_records(lines, lambda row: 1 + _corner_count(row[0])), n_faces))
@@ -239,11 +244,11 @@ def read_off(path: PathLike) -> Elements:
         has_normals = "N" in kind[:-3] and all(len(row) >= 6 for row in vertex_rows)
         normals = parsed_numbers([row[3:6] for row in vertex_rows], "normals") if has_normals else None
         return Elements(vertices, normals=normals)
-    counts = parsed_numbers([row[0] for row in face_rows], "numbers of corners", int)
+    counts = integers([row[0] for row in face_rows], "numbers of corners", 0)
     if any(len(row) <= count for row, count in zip(face_rows, counts.tolist(), strict=True)):
         raise damaged("a face has fewer corners than announced: it may be truncated")
     corners = [word for row, count in zip(face_rows, counts.tolist(), strict=True) for word in row[1 : 1 + count]]
-    return Elements(vertices, parsed_numbers(corners, "vertex ids", int), counts)
+    return Elements(vertices, integers(corners, "vertex ids", 0), counts)
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
@@ -257,7 +262,7 @@ def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> 
 
 def _corner_count(word: str) -> int:
     """Return the number of corners that a face announces; 0 if the word is no number, which is refused later."""
-    return int(word) if word.isdecimal() and len(word) < 19 else 0
+    return int(word) if word.isascii() and word.isdecimal() and len(word) < 19 else 0
 
 
 def write_off(shape: Elements, path: PathLike) -> bytes:

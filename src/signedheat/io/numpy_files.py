@@ -13,7 +13,8 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError
-from .files import PathLike, contents, damaged, ensure_fits, reading, replacing
+from .budgets import charge
+from .files import PathLike, contents, damaged, reading, replacing
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 
@@ -22,7 +23,7 @@ def read_npy(path: PathLike) -> NDArray[Any]:
     """Read the array of a ``.npy`` file."""
     data = contents(path)
     with reading(path):
-        return _array(io.BytesIO(data), len(data), path)
+        return _array(io.BytesIO(data), len(data))
 
 
 def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = ()) -> dict[str, NDArray[Any]]:
@@ -34,7 +35,7 @@ def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = 
         for name in (*needed, *wanted):
             if info := members.get(f"{name}.npy"):
                 with archive.open(info) as file:
-                    arrays[name] = _array(file, info.file_size, path)
+                    arrays[name] = _array(file, info.file_size)
             elif name in needed:
                 raise FileFormatError(f"it has no {name}", remedy="check that it is the right file", element=name)
         return arrays
@@ -54,7 +55,7 @@ def names_in_npz(path: PathLike) -> set[str]:
         return {name.removesuffix(".npy") for name in archive.namelist()}
 
 
-def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
+def _array(file: IO[bytes], size: int) -> NDArray[Any]:
     """Read an array of numbers from a file of `size` bytes."""
     version = npy.read_magic(file)
     if version not in _HEADERS:
@@ -67,7 +68,7 @@ def _array(file: IO[bytes], size: int, path: PathLike) -> NDArray[Any]:
         raise damaged(
             f"an array of shape {shape} needs {announced} bytes, of which {available} are there: the file is truncated"
         )
-    ensure_fits(announced, path)
+    charge(bytes=announced)
     values = np.empty(shape, dtype, order="F" if is_fortran else "C")
     flat = values.ravel(order="K").view(np.uint8).data if announced else memoryview(b"")
     position = 0

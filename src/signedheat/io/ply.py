@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import Elements
-from .files import PathLike, contents, damaged, ensure_writable, parsed_numbers, replacing
+from .budgets import charge_words
+from .files import PathLike, contents, damaged, ensure_writable, replacing
+from .numerals import integer, integers, parsed_numbers
 
 PLY_TYPES = {
     name: code
@@ -69,10 +71,10 @@ def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
     if lists is not None and not isinstance(lists, tuple):
         raise damaged("the vertex ids of faces are not lists")
     if lists is not None and len(lists[1]):
-        return Elements(vertices, corners=lists[0], counts=lists[1], values=values)
+        return Elements(vertices, corners=integers(lists[0], "vertex ids"), counts=lists[1], values=values)
     strips = next((column for column in tables.get("tristrips", {}).values() if isinstance(column, tuple)), None)
     if strips is not None and len(strips[0]) >= 3:
-        faces = _unrolled(strips[0])
+        faces = _unrolled(integers(strips[0], "vertex ids of strips", -1))
         return Elements(vertices, faces.ravel(), np.full(len(faces), 3), values=values)
     normals = _columns(vertex, ["nx", "ny", "nz"]) if {"nx", "ny", "nz"} <= vertex.keys() else None
     return Elements(vertices, normals=normals, areas=vertex.get("area"), values=values)
@@ -181,7 +183,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
                 case ["format"]:
                     form = words[1]
                 case ["element"]:
-                    elements.append(_Element(words[1], _count(words[2])))
+                    elements.append(_Element(words[1], integer(words[2], f"number of {words[1]}")))
                 case ["property"] if words[1] == "list":
                     elements[-1].add(words[4], (PLY_INTEGERS[words[2]], PLY_TYPES[words[3]]))
                 case ["property"]:
@@ -191,13 +193,6 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
     if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
         raise damaged(f"the format '{form}' does not exist in PLY: the file is damaged")
     return form, elements, data[newline + 1 :]
-
-
-def _count(word: str) -> int:
-    """Return the number of rows that a word of the header announces; raise ValueError if it is none."""
-    if not word.isdecimal() or len(word) > 18:
-        raise ValueError(word)
-    return int(word)
 
 
 def _truncated(element: _Element) -> FileFormatError:
@@ -252,9 +247,7 @@ class _BinaryReader:
             return None
         self.at += row.itemsize * element.count
         return {
-            name: (rows[column].astype(np.int64).ravel(), np.full(element.count, lengths[name]))
-            if name in lists
-            else rows[column]
+            name: (rows[column].ravel(), np.full(element.count, lengths[name])) if name in lists else rows[column]
             for name, column in columns.items()
         }
 
@@ -272,7 +265,7 @@ class _BinaryReader:
         return {
             name: np.concatenate(columns[name])
             if isinstance(kind, str)
-            else (np.concatenate(columns[name]).astype(np.int64), np.array(counts[name]))
+            else (np.concatenate(columns[name]), np.array(counts[name]))
             for name, kind in element.properties.items()
         }
 
@@ -287,6 +280,7 @@ class _BinaryReader:
 
 def _text_reader(body: bytes) -> Any:
     """Return a function that reads the columns of the next element from text, as `_BinaryReader.read` does."""
+    charge_words(body)
     lines = iter([line.decode("ascii", errors="replace") for line in body.splitlines() if line.strip()])
 
     def read(element: _Element) -> dict[str, Any]:
@@ -303,15 +297,12 @@ def _text_reader(body: bytes) -> Any:
                     table[name] = parsed_numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'")
                     starts = [k + 1 for k in starts]
                     continue
-                counts = parsed_numbers([row[k] for row, k in zip(rows, starts, strict=True)], f"'{name}'", int)
+                counts = integers([row[k] for row, k in zip(rows, starts, strict=True)], f"lengths of '{name}'", 0)
                 ends = [k + 1 + n for k, n in zip(starts, counts.tolist(), strict=True)]
-                if any(n < 0 for n in counts.tolist()):
-                    raise IndexError
                 if any(len(row) < end for row, end in zip(rows, ends, strict=True)):
                     raise IndexError
                 flat = [word for row, k, end in zip(rows, starts, ends, strict=True) for word in row[k + 1 : end]]
-                entry = float if kind[1].startswith("f") else int
-                table[name] = parsed_numbers(flat, f"'{name}'", entry), counts
+                table[name] = (parsed_numbers if kind[1].startswith("f") else integers)(flat, f"'{name}'"), counts
                 starts = ends
         except IndexError:
             raise _truncated(element) from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import math
 import re
 import struct
 from collections.abc import Sequence
@@ -15,12 +16,14 @@ from ..errors import FileFormatError
 from ..exchange import Elements
 from ..packages import ensure_installed
 from ..surfaces.point_cloud import PointCloud
+from .budgets import charge, charge_words
 from .files import PathLike, contents, damaged, extension, reading, refuse_kind, text
+from .numerals import integer, parsed_numbers
 from .sandbox import parsed
 
 SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
 """Replacements of commas and semicolons: both separate numbers, or commas are decimal."""
-WITH_COMMA = re.compile(r"[-+]?\d+(,\d+)?([eE][-+]?\d+)?")
+WITH_COMMA = re.compile(r"[-+]?[0-9]+(,[0-9]+)?([eE][-+]?[0-9]+)?")
 FIELD_TYPES = {"F": "f", "I": "i", "U": "u"}
 """Types of fields, with their letters in NumPy."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
@@ -36,6 +39,7 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
     blocks: list[list[list[float]]] = [[]]
     columns = 0
     content = text(path)
+    charge_words(content)
     meaning = DECIMAL_COMMAS if _has_decimal_commas(content) else SEPARATORS
     for number, line in enumerate(content.split("\n"), start=1):
         words = line.partition("#")[0].translate(meaning).split()
@@ -44,7 +48,7 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
                 blocks.append([])
             continue
         try:
-            values = [float(word) for word in words]
+            values = [float(word) for word in words] if "_" not in line and line.isascii() else []
         except ValueError:
             values = []
         if values and len(values) == (columns or len(values)) and len(values) in widths:
@@ -131,12 +135,13 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
     """Return the first number of each field at the n points of a PCD file, (n,), by the name of the field."""
     try:
         names, kind = header["FIELDS"], header["DATA"][0].lower()
-        counts = [int(word) for word in header.get("COUNT", ["1"] * len(names))]
-        n = int(header["POINTS"][0]) if "POINTS" in header else int(header["WIDTH"][0]) * int(header["HEIGHT"][0])
+        counts = [integer(word, "COUNT", 1) for word in header.get("COUNT", ["1"] * len(names))]
+        sizes = [header["POINTS"][0]] if "POINTS" in header else [header["WIDTH"][0], header["HEIGHT"][0]]
+        n = math.prod(integer(word, "number of points") for word in sizes)
         types = [FIELD_TYPES[letter] + size for letter, size in zip(header["TYPE"], header["SIZE"], strict=True)]
         fields = [(f"{k}", f"<{code}", (count,)) for k, (code, count) in enumerate(zip(types, counts, strict=True))]
         row = np.dtype(fields)
-        if len(names) != len(fields) or n < 0:
+        if len(names) != len(fields):
             raise ValueError
     except (KeyError, ValueError, IndexError, TypeError):
         raise FileFormatError("the header of the PCD file is not complete, or contradicts itself") from None
@@ -145,6 +150,7 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
             raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
         rows = np.frombuffer(body, row, n)
         return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
+    charge(bytes=2 * n * row.itemsize)
     if kind == "binary_compressed":  # all values of a field come before those of the next
         body, position = _unpacked(body, n * row.itemsize), 0
         table = {}
@@ -156,9 +162,10 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
         return table
     if kind != "ascii":
         raise FileFormatError(f"data are {kind}", remedy="write them as ascii, binary or binary_compressed")
+    charge_words(body)
     try:
-        numbers = np.array([line.decode("ascii").split() for line in body.splitlines() if line.strip()], dtype=float)
-        numbers = numbers.reshape(n, sum(counts))
+        lines = [line.decode("ascii").split() for line in body.splitlines() if line.strip()]
+        numbers = parsed_numbers(lines, "points").reshape(n, sum(counts))
     except (ValueError, UnicodeDecodeError):
         raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
     begins = np.concatenate([[0], np.cumsum(counts)])

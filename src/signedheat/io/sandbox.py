@@ -20,10 +20,9 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError
-from ..memory import available_memory
 from ..packages import ensure_installed, missing_package
-from . import parsers
-from .files import PathLike, ensure_fits, size_of
+from . import budgets, parsers
+from .files import PathLike, size_of
 
 PARSER_PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv.pop(1)); file = sys.argv.pop(1); "
@@ -32,8 +31,6 @@ PARSER_PROGRAM = (
 """Program of the process: it starts isolated from the current folder, then takes over the import path."""
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
 """Memory limit of a parser in bytes: a constant part, and a factor of the size of the file."""
-LEAST_SECONDS = 10
-"""Limit of processor time of a parser; every 20,000 bytes of the file add one second to it."""
 ARRAY_TYPE = re.compile(r"[<>|][biuf][1248]")
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
@@ -52,15 +49,13 @@ def parsed(
     """Parse a file by a function of `parsers` in a process of its own, and return arrays and other values by name.
 
     The function needs `package`; errors say that this is for a `purpose`. Its memory is limited to `LEAST_MEMORY` and
-    `bytes_per_byte` for each byte of the file, its processor time to `least_seconds` and more for large files.
-    `options` are passed on to it, and JSON must be able to hold them.
+    `bytes_per_byte` for each byte of the file, its processor time to `least_seconds` and more for large files, and both
+    to the budget of the file. `options` are passed on to it, and JSON must be able to hold them.
     """
     size = size_of(path)
     ensure_installed(package, purpose)
-    free = available_memory()
-    memory = LEAST_MEMORY + bytes_per_byte * size
-    memory = memory if free is None else min(memory, free)
-    seconds = (least_seconds or LEAST_SECONDS) + size // 20_000
+    left, seconds = budgets.left(path, least_seconds or budgets.LEAST_SECONDS)
+    memory = int(min(LEAST_MEMORY + bytes_per_byte * size, left))
     folders = json.dumps([os.path.abspath(folder) for folder in sys.path if folder])
     order = [function, os.path.abspath(path), json.dumps(options), str(memory), str(seconds)]
     with tempfile.TemporaryFile() as messages:
@@ -73,7 +68,7 @@ def parsed(
         )
         with process:
             try:
-                values = _answer(cast("BinaryIO", process.stdout), path)
+                values = _answer(cast("BinaryIO", process.stdout), left)
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(1.0)
             finally:
@@ -91,8 +86,11 @@ def parsed(
     return values
 
 
-def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
-    """Read the answer of a parser, values and arrays by name; return None if it is incomplete or malformed."""
+def _answer(stream: BinaryIO, left: float) -> dict[str, Any] | None:
+    """Read the answer of a parser, values and arrays by name; return None if it is incomplete or malformed.
+
+    Raise `MemoryLimitError` if its arrays have more bytes than are `left`.
+    """
     try:
         about = json.loads(stream.readline(1 << 24))  # longer than any answer without its arrays
         if "values" not in about:
@@ -104,7 +102,9 @@ def _answer(stream: BinaryIO, path: PathLike) -> dict[str, Any] | None:
     for name, code, shape in shapes:
         if not ARRAY_TYPE.fullmatch(code) or min(shape, default=0) < 0:
             return None
-        ensure_fits(prod(shape) * np.dtype(code).itemsize, path)
+        left -= prod(shape) * np.dtype(code).itemsize
+        if left < 0:
+            raise MemoryLimitError("what it holds does not fit in memory", remedy="free some memory")
         values[name] = np.empty(shape, dtype=code)
         rest = memoryview(values[name].reshape(-1).view(np.uint8))
         while rest:

@@ -19,7 +19,9 @@ from ..packages import ensure_installed
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import Body, concatenated, placed
 from . import gltf
-from .files import PathLike, contents, damaged, ensure_fits, extension, reading
+from .budgets import BYTES_PER_PLACED, XML, charge, charge_tree
+from .files import PathLike, contents, damaged, extension, reading
+from .numerals import integers, parsed_numbers
 from .sandbox import parsed
 
 METRES = {
@@ -84,8 +86,9 @@ def read_3mf(path: PathLike) -> TriangleMesh:
         if not items:  # nothing says what to build: take each object that has a mesh
             keys = [_key(element, package.root, "id") for element in _all(root, "object")]
             items = [(key, np.eye(4, 3)) for key in keys if len(package.object(key).faces)]
-        ensure_fits(100 * sum(package.count(key)[0] for key, _ in items), path)  # bytes for a triangle and its vertices
-        return _joined([body for key, matrix in items for body in package.placed(key, matrix)])
+        package.charge([key for key, _ in items])
+        bodies = [(package.body(key), matrix) for key, matrix in items]
+        return _joined([placed(body, matrix) for body, matrix in bodies if len(body[1])])
 
 
 def unit_of(path: PathLike) -> str | None:
@@ -105,6 +108,7 @@ def unit_of(path: PathLike) -> str | None:
 
 def _collada_unit(data: bytes) -> str | None:
     """Return the unit in the first ``<asset>`` of a COLLADA file: any name may stand beside its length in metres."""
+    charge_tree(data, XML)
     for _, element in ElementTree.iterparse(io.BytesIO(data)):
         if element.tag.endswith("}unit"):
             try:
@@ -127,11 +131,11 @@ class _Package:
     """A 3MF package, which is a ZIP archive; its parts are read when they are needed."""
 
     def __init__(self, path: PathLike) -> None:
-        self._path = path
         self._zip = zipfile.ZipFile(io.BytesIO(contents(path)))
         self._models: dict[str, ElementTree.Element] = {}
         self._objects: dict[Key, _Object] = {}
-        self._counts: dict[Key, tuple[int, int]] = {}
+        self._sizes: dict[Key, tuple[int, int]] = {}
+        self._bodies: dict[Key, Body] = {}
 
     @property
     def root(self) -> str:
@@ -158,37 +162,48 @@ class _Package:
                 raise damaged(f"object {wanted} does not exist", element=f"object {wanted}")
         return self._objects[key]
 
-    def count(self, key: Key, depth: int = 0) -> tuple[int, int]:
-        """Return the numbers of triangles and of levels of an object with all its components, without placing them."""
-        if key not in self._counts:
-            if depth > MOST_COMPONENT_DEPTH:
-                raise damaged("its components contain themselves, or too many others")
-            item = self.object(key)
-            inner = [self.count(part, depth + 1) for part, _ in item.parts]
-            height = 1 + max((height for _, height in inner), default=0)
-            if height > MOST_COMPONENT_DEPTH:
-                raise damaged(f"its components lie more than {MOST_COMPONENT_DEPTH} levels deep")
-            self._counts[key] = len(item.faces) + sum(count for count, _ in inner), height
-        return self._counts[key]
+    def charge(self, keys: Sequence[Key], depth: int = 0) -> tuple[int, int]:
+        """Charge objects that are about to be placed together; return their size and the levels of their components.
 
-    def placed(self, key: Key, matrix: Floats) -> Iterator[Body]:
-        """Yield the transformed vertices and faces of an object and its components, except those without triangles."""
-        if not self.count(key)[0]:
-            return
-        item = self.object(key)
-        if len(item.faces):
-            yield placed((item.vertices, item.faces), matrix)
-        for part, own in item.parts:
-            yield from self.placed(part, np.vstack([own[:3] @ matrix[:3], own[3] @ matrix[:3] + matrix[3]]))
+        What components are made of is charged once, as `body` makes it.
+        """
+        made, height = 0, 0
+        for key in keys:
+            if key not in self._sizes:
+                if depth > MOST_COMPONENT_DEPTH:
+                    raise damaged("its components contain themselves, or too many others")
+                item = self.object(key)
+                size, levels = self.charge([part for part, _ in item.parts], depth + 1)
+                if levels >= MOST_COMPONENT_DEPTH:
+                    raise damaged(f"its components lie more than {MOST_COMPONENT_DEPTH} levels deep")
+                self._sizes[key] = len(item.vertices) + len(item.faces) + size, levels + 1
+            size, levels = self._sizes[key]
+            made, height = made + size, max(height, levels)
+        charge(BYTES_PER_PLACED * made, len(keys), made)
+        return made, height
+
+    def body(self, key: Key) -> Body:
+        """Return the vertices and faces of an object with all its components, without those that have no faces.
+
+        Each object is made once, so that the work is that of the result, also where each level names another one twice.
+        """
+        if key not in self._bodies:
+            item = self.object(key)
+            inner = [(self.body(part), matrix) for part, matrix in item.parts]
+            bodies = [(item.vertices, item.faces)] if len(item.faces) or not inner else []
+            bodies += [placed(body, matrix) for body, matrix in inner if len(body[1])]
+            self._bodies[key] = concatenated(bodies) if len(bodies) > 1 else (*bodies, (item.vertices, item.faces))[0]
+        return self._bodies[key]
 
     def _bytes(self, part: str) -> bytes:
         """Return the bytes of a part; no more are unpacked than the archive announces."""
         entry = self._zip.getinfo(part)
-        ensure_fits(10 * entry.file_size, self._path)  # its tree of elements is several times larger
+        charge(bytes=entry.file_size)
         with self._zip.open(entry) as file:
             data = file.read(entry.file_size)
         if b"<!DOCTYPE" in data[:4096] or b"<!ENTITY" in data:
             raise damaged("its model defines entities")
+        charge_tree(data, XML)
         return data
 
 
@@ -212,21 +227,21 @@ def _matrix(element: ElementTree.Element) -> Floats:
     words = element.get("transform")
     if words is None:
         return np.eye(4, 3)
-    return np.array([float(word) for word in words.split()]).reshape(4, 3)
+    return parsed_numbers(words.split(), "transform").reshape(4, 3)
 
 
 def _object(element: ElementTree.Element, part: str) -> _Object:
     """Return the object that an element of a part describes."""
-    vertices = [[float(v.get(axis, "nan")) for axis in "xyz"] for v in _all(element, "vertex")]
-    faces = [[int(t.get(corner, "-1")) for corner in ("v1", "v2", "v3")] for t in _all(element, "triangle")]
+    vertices = [v.get(axis, "nan") for v in _all(element, "vertex") for axis in "xyz"]
+    faces = [t.get(corner, "") for t in _all(element, "triangle") for corner in ("v1", "v2", "v3")]
     parts = [(_key(component, part), _matrix(component)) for component in _all(element, "component")]
-    ids = np.array(faces, dtype=np.int64).reshape(-1, 3)
-    if len(ids) and (ids.min() < 0 or ids.max() >= len(vertices)):
+    ids = integers(faces, "corners of triangles", 0).reshape(-1, 3)
+    if len(ids) and 3 * ids.max() >= len(vertices):
         raise damaged(
             f"object {element.get('id')} refers to a vertex that it does not have",
             element=f"object {element.get('id')}",
         )
-    return _Object(np.array(vertices, dtype=np.float64).reshape(-1, 3), ids, parts)
+    return _Object(parsed_numbers(vertices, "vertices").reshape(-1, 3), ids, parts)
 
 
 def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, Ints]:

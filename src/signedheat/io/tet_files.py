@@ -22,7 +22,8 @@ from ..packages import require
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from .files import PathLike, contents, damaged, extension, format_for, parsed_numbers, replacing, writing
+from .files import PathLike, contents, damaged, extension, format_for, replacing, writing
+from .numerals import integers
 from .sandbox import parsed
 from .vtk_xml import Block, Cells, read_vtu
 
@@ -43,6 +44,8 @@ TET_FORMATS = frozenset(MESHIO_MODULES)
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
 """Sections of Gmsh files, and the number of counts at the beginning of each (one in version 2)."""
+LONGEST_LINE = 200
+"""Bytes of a line with counts, at most."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
 """Sections that begin with text even in binary files."""
 
@@ -92,16 +95,17 @@ def _files(path: PathLike) -> list[Path]:
 def _refuse_announcements(path: PathLike) -> None:
     """Raise `FileFormatError` if a Gmsh file announces more items than it has bytes, which would stall meshio."""
     data = contents(path)
-    form = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+([48])\s", data)
-    if form is None:
+    begin = data.find(b"$MeshFormat")
+    version, form, size = (*data[max(begin, 0) : begin + LONGEST_LINE].split()[1:4], b"", b"", b"")[:3]
+    if begin < 0 or form not in (b"0", b"1") or size not in (b"4", b"8"):
         return  # meshio reports it
-    is_raw, kind = form[2] == b"1" and form[1].startswith(b"4"), np.dtype(f"<u{form[3].decode()}")
+    is_raw, kind = form == b"1" and version.startswith(b"4"), np.dtype(f"<u{size.decode()}")
     for section in re.finditer(rb"^\$(\w+)[ \t]*\r?\n", data, re.MULTILINE):
         name, begin = section[1].decode(), section.end()
         if is_raw and name in COUNTED and name not in IN_TEXT:
             counts = np.frombuffer(data, kind, COUNTED[name], begin).tolist()
         else:
-            words = data[begin : begin + 100].split(b"\n")[0].split()[: COUNTED.get(name, 0)]
-            counts = parsed_numbers(words, f"counts of {name}", int).tolist()
+            words = data[begin : begin + LONGEST_LINE].split(b"\n")[0].split()[: COUNTED.get(name, 0)]
+            counts = integers(words, f"counts of {name}").tolist()
         if max(counts, default=0) > len(data):
             raise damaged(f"it has {len(data)} bytes, and announces {max(counts)} {name}", element=name)

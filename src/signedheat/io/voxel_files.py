@@ -21,6 +21,7 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import transform
 from ..validation import array_of, numbers
+from .budgets import charge
 from .field_files import CONVENTION, ensure_field_writable, made, save_field
 from .files import PathLike, ensure_writable, extension, reading, replacing
 from .image_files import NIBABEL, NIFTI, nibabel, read_image, write_nrrd
@@ -29,6 +30,8 @@ Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
 VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
+BYTES_PER_VOXEL = 12
+"""Memory for a voxel while the boundary of a volume is found: measured."""
 SPACES = {
     "right-anterior-superior": (1, 1, 1),
     "left-posterior-superior": (-1, -1, 1),
@@ -355,8 +358,9 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     ...     read_volume(f"{folder}/one.npy").n_vertices
     8
     """
-    image = read_image(path, VOLUME_FORMATS, "a volume")
     with reading(path):
+        image = read_image(path, VOLUME_FORMATS, "a volume")
+        charge(bytes=BYTES_PER_VOXEL * image.values.size)
         if image.values.ndim != 3:
             raise FileFormatError(f"a volume has 3 axes, and the image has {image.values.ndim}")
         inside = image.values if level is None else image.values > level

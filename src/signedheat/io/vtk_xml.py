@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import Elements
-from .files import PathLike, contents, damaged, ensure_fits, parsed_numbers
+from .budgets import BYTES_PER_PLACED, XML, charge, charge_tree, charge_words
+from .files import PathLike, contents, damaged
+from .numerals import integer, integers, parsed_numbers
 
 VTK_TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
 VTK_TYPES |= {"Float32": "f4", "Float64": "f8"}
@@ -65,7 +67,7 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
     """Read the array that the file says to show, or else the first; origin; spacing; and the array `other`, if any."""
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
-    extent = parsed_numbers(image.get("WholeExtent", "").split() if image is not None else [], "extent", int)
+    extent = integers(image.get("WholeExtent", "").split() if image is not None else [], "extent")
     if (
         image is None
         or piece is None
@@ -124,22 +126,27 @@ def write_vtp(shape: Elements, path: PathLike) -> bytes:
 def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     """Read the polygons of all pieces, or else the points, with values by `names` where all pieces have them."""
     root, arrays = parse(path, "PolyData")
+    pieces = root.findall("PolyData/Piece")
+    made = sum(arrays.count(piece, name) for piece in pieces for name in ("NumberOfPoints", "NumberOfPolys"))
+    charge(BYTES_PER_PLACED * made, len(pieces), made)
     points, corners, counts, n_points = [], [], [], 0
     found: dict[str, list[NDArray[Any]]] = {name: [] for name in ("Normals", "area", *names)}
-    for piece in root.iterfind("PolyData/Piece"):
+    for piece in pieces:
         table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
         if arrays.count(piece, "NumberOfStrips"):
             raise FileFormatError("there are triangle strips", remedy="turn them into triangles before saving")
         n_own, n_faces = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfPolys")
         xyz = next((element for (tag, _), element in table.items() if tag == "Points"), None)
-        offsets = arrays.of(table.get(("Polys", "offsets")), n_faces).astype(np.int64)
+        offsets = integers(arrays.of(table.get(("Polys", "offsets")), n_faces), "offsets", 0)
         if n_faces == 0 and piece.get("NumberOfPolys") is None and piece.find("Polys/DataArray") is not None:
             raise FileFormatError("it does not announce NumberOfPolys", element="NumberOfPolys")
         steps = np.diff(offsets, prepend=0)
         if (steps < 0).any():
             raise damaged("its offsets decrease: it is damaged")
         n_corners = int(offsets[-1]) if n_faces else 0
-        corners.append(arrays.of(table.get(("Polys", "connectivity")), n_corners).astype(np.int64) + n_points)
+        corners.append(
+            integers(arrays.of(table.get(("Polys", "connectivity")), n_corners), "connectivity", 0) + n_points
+        )
         counts.append(steps)
         for name, parts in found.items():  # normals and areas belong to points only
             element = None if n_faces and name not in names else table.get(("PointData", name))
@@ -154,7 +161,7 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     faces = np.concatenate(corners), np.concatenate(counts)
     if len(faces[1]):
         return Elements(np.concatenate(points), *faces, values=values)
-    if any(arrays.count(piece, "NumberOfLines") for piece in root.iterfind("PolyData/Piece")):
+    if any(arrays.count(piece, "NumberOfLines") for piece in pieces):
         raise FileFormatError("there are lines and no faces", remedy="save the points alone, or a surface")
     normals = columns["Normals"].reshape(-1, 3) if "Normals" in columns else None
     return Elements(np.concatenate(points), normals=normals, areas=columns.get("area"), values=values)
@@ -192,25 +199,32 @@ def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
     columns = {element.get("Name"): element for element in piece.iterfind("Cells/DataArray")}
     if not {"connectivity", "offsets", "types"} <= columns.keys():
         raise FileFormatError("its cells have no connectivity, offsets and types", path=path)
-    ends = arrays.of(columns["offsets"], n_cells).astype(np.int64)
-    kinds = arrays.of(columns["types"], n_cells).astype(np.int64)
+    ends = integers(arrays.of(columns["offsets"], n_cells), "offsets", 0)
+    kinds = integers(arrays.of(columns["types"], n_cells), "types", 0)
     starts = np.concatenate([[0], ends])[:-1]
     if (ends < starts).any():
         raise FileFormatError("its offsets decrease: it is damaged", remedy="write it again", path=path)
-    corners = arrays.of(columns["connectivity"], int(ends[-1]) if n_cells else 0).astype(np.int64)
+    corners = integers(arrays.of(columns["connectivity"], int(ends[-1]) if n_cells else 0), "connectivity", 0)
+    alike = pairs_of(kinds, ends - starts)
+    charge(elements=len(alike))
     blocks = []
-    for kind in np.unique(kinds).tolist():
-        chosen = np.flatnonzero(kinds == kind)
-        counts = (ends - starts)[chosen]
-        for count in np.unique(counts).tolist():
-            rows = starts[chosen[counts == count]]
-            blocks.append(Block(CELL_NAMES.get(kind, f"type {kind}"), corners[rows[:, None] + np.arange(count)]))
+    for chosen in alike:
+        kind, first = int(kinds[chosen[0]]), starts[chosen[0]]
+        rows = starts[chosen][:, None] + np.arange(ends[chosen[0]] - first)
+        blocks.append(Block(CELL_NAMES.get(kind, f"type {kind}"), corners[rows]))
     data = {
         name: arrays.of(element, n_points)
         for element in piece.iterfind("PointData/DataArray")
         if (name := element.get("Name")) in names
     }
     return Cells(points, blocks, data)
+
+
+def pairs_of(first: Ints, second: Ints) -> list[Ints]:
+    """Return the indices at which both numbers are the same, in ascending order of the numbers."""
+    order = np.lexsort([second, first])
+    changes = (np.diff(first[order]) != 0) | (np.diff(second[order]) != 0)
+    return np.split(order, np.flatnonzero(changes) + 1) if len(order) else []
 
 
 def _words(values: Any) -> str:
@@ -249,7 +263,6 @@ class _Writer:
 class _Arrays:
     """Decodes the arrays of one file."""
 
-    path: PathLike
     order: str
     header: np.dtype[Any]
     compressor: str | None
@@ -258,10 +271,7 @@ class _Arrays:
 
     def count(self, piece: ElementTree.Element, name: str) -> int:
         """Return a count that a piece announces, 0 by default."""
-        word = piece.get(name, "0").strip()
-        if not word.isdecimal() or len(word) > 18:
-            raise damaged(f"{name} is {word!r}: it is damaged", element=name)
-        return int(word)
+        return integer(piece.get(name, "0").strip(), name)
 
     def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
         """Return the `count` numbers of a DataArray element; no more are unpacked."""
@@ -270,17 +280,22 @@ class _Arrays:
         code = VTK_TYPES.get(element.get("type", ""))
         if code is None:
             raise FileFormatError(f"arrays of type '{element.get('type')}' are not supported", remedy="use Float64")
-        form, inline = element.get("format"), (element.text or "").split()
+        form = element.get("format")
+        charge_words(element.text or "")
+        inline = (element.text or "").split()
         if form == "ascii":
-            return self._counted(parsed_numbers(inline, "values").astype(code), count)
+            values = parsed_numbers(inline, "values") if code[0] == "f" else integers(inline, "values")
+            if code[0] != "f" and values.size and not (values == values.astype(code)).all():
+                raise damaged(f"values do not fit into {element.get('type')}")
+            return self._counted(values.astype(code), count)
         size = count * np.dtype(code).itemsize
-        ensure_fits(size, self.path)
+        charge(bytes=(1 if self.compressor is None else 3) * size)  # compressed blocks, joined
         try:
             if form == "binary":
                 data = self._block("".join(inline).encode(), True, size)
             else:
-                start = int(element.get("offset", 0))
-                data = self._block(memoryview(self.appended)[max(start, 0) :], self.encoding == "base64", size)
+                start = integer(element.get("offset", "0"), "offset")
+                data = self._block(memoryview(self.appended)[start:], self.encoding == "base64", size)
             values = np.frombuffer(data, self.order + code)
         except (ValueError, IndexError, zlib.error, binascii.Error) as error:
             raise damaged(f"an array cannot be decoded ({error}): the file is truncated") from error
@@ -347,6 +362,7 @@ def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
         encoding = "base64" if b"base64" in data[mark:start] else "raw"
         appended = data[start + 1 :]
         data = data[:mark] + b"</VTKFile>"
+    charge_tree(data, XML)
     try:
         root = ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
@@ -358,4 +374,4 @@ def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
     if width is None:
         raise damaged(f"its header_type '{root.get('header_type')}' is unknown: it is damaged")
     header = np.dtype(order + width)
-    return root, _Arrays(path, order, header, root.get("compressor"), encoding, appended)
+    return root, _Arrays(order, header, root.get("compressor"), encoding, appended)

@@ -1,0 +1,93 @@
+"""Numbers in files: words of text, values of JSON, and arrays, checked where they are read.
+
+Python and NumPy take ``1_0`` for 10, digits of any script, and round 1.7 to a vertex id. No format has any of these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Floats, Ints
+from ..errors import FileFormatError
+from ..validation import INT64_END
+from .files import damaged
+
+
+def parsed_numbers(words: Sequence[Any], what: str) -> Floats:
+    """Convert words of a text, or rows of them, to real numbers."""
+    _refuse_odd(words, what)
+    try:
+        return np.array(words, dtype=np.float64)
+    except (ValueError, OverflowError) as error:
+        raise _not(what, "numbers", error) from error
+
+
+def integers(values: object, what: str, least: int | None = None) -> Ints:
+    """Convert words of a text, numbers of JSON or an array to integers; refuse fractions, and numbers below `least`."""
+    if isinstance(values, np.ndarray):
+        found = _whole(values, what)
+    else:
+        found = _parsed(values if isinstance(values, list | tuple) else [values], what)
+    if least is not None and found.size and found.min() < least:
+        at = int(np.argmax(found < least))
+        raise damaged(f"number {at} of {what} is {found.flat[at]}, less than {least}", element=f"number {at}")
+    return found
+
+
+def integer(value: object, what: str, least: int = 0) -> int:
+    """Convert a word of a text or a number of JSON to an integer; refuse fractions, and numbers below `least`."""
+    try:
+        [found] = integers([value], what).tolist()
+    except FileFormatError as error:
+        raise damaged(f"{what} is {_shown(value)}, which is no integer", element=what) from error
+    if found < least:
+        raise damaged(f"{what} is {found}, less than {least}", element=what)
+    return int(found)
+
+
+def _whole(values: NDArray[Any], what: str) -> Ints:
+    """Return an array of whole numbers as integers."""
+    if values.dtype.kind == "f" and values.size:
+        if not (np.abs(values) < INT64_END).all() or (values != np.rint(values)).any():
+            raise damaged(f"{what} are not all integers")
+    elif values.dtype.kind not in "iuf" or (values.dtype == np.uint64 and values.size and values.max() >= INT64_END):
+        raise damaged(f"{what} are not all integers of at most 63 bits")
+    return values.astype(np.int64)
+
+
+def _parsed(values: Sequence[Any], what: str) -> Ints:
+    """Return words, or numbers of JSON, as integers."""
+    if all(isinstance(value, str) for value in values) or all(isinstance(value, bytes) for value in values):
+        _refuse_odd(values, what)
+    else:
+        for value in values:
+            if isinstance(value, bool) or not isinstance(value, int | float) or value % 1 != 0:
+                raise damaged(f"{what} are not all integers: one is {_shown(value)}")
+        values = [int(value) for value in values]
+    try:
+        return np.array(values, dtype=np.int64)
+    except (ValueError, OverflowError) as error:
+        raise _not(what, "integers", error) from error
+
+
+def _refuse_odd(words: Sequence[Any], what: str) -> None:
+    """Refuse digits and separators that Python knows and files do not have."""
+    if words and isinstance(words[0], list):
+        words = [word for row in words for word in row]
+    are_bytes = bool(words) and isinstance(words[0], bytes)
+    joined = b"".join(words).decode("latin-1") if are_bytes else "".join(words)
+    if not joined.isascii() or "_" in joined:
+        odd = next(word for word in words if not word.isascii() or "_" in str(word))
+        raise damaged(f"{what} are not all numbers: one is {_shown(odd)}")
+
+
+def _not(what: str, kind: str, error: Exception) -> FileFormatError:
+    return damaged(f"{what} are not all {kind} ({error}): the file is damaged")
+
+
+def _shown(value: object) -> str:
+    return f"{value!r:.40}" if isinstance(value, str | bytes | int | float | None) else f"a {type(value).__name__}"

@@ -1,0 +1,278 @@
+"""Small files that stand for much: what reading them may take is counted before it is made."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from signedheat import samples
+from signedheat.errors import LONGEST_TEXT, FileFormatError, MemoryLimitError, SignedHeatError
+from signedheat.io import budgets
+
+SECONDS = 3.0
+"""Processor time for a file of some kilobytes, on a busy machine."""
+
+
+def three_mf(path, objects, items):
+    build = "".join(f'<item objectid="{item}"/>' for item in items)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr("3D/3dmodel.model", f"<model><resources>{objects}</resources><build>{build}</build></model>")
+
+
+TRIANGLE = (
+    '<mesh><vertices><vertex x="0" y="0" z="0"/><vertex x="1" y="0" z="0"/><vertex x="0" y="1" z="0"/></vertices>'
+    '<triangles><triangle v1="0" v2="1" v3="2"/></triangles></mesh>'
+)
+
+
+def doubled_3mf(path, levels):
+    parts = "".join(
+        f'<object id="{k}"><components>{2 * f"""<component objectid="{k - 1}"/>"""}</components></object>'
+        for k in range(1, levels + 1)
+    )
+    three_mf(path, f'<object id="0">{TRIANGLE}</object>{parts}', [levels])
+
+
+def doubled_svg(path, levels):
+    groups = "".join(f'<g id="g{k}">{2 * f"""<use href="#g{k - 1}"/>"""}</g>' for k in range(1, levels + 1))
+    path.write_text(f'<svg><defs><path id="g0" d="M0 0L1 1"/>{groups}</defs><use href="#g{levels}"/></svg>')
+
+
+def used_curves(path, levels):
+    curve = "M0 0" + "C1 1 2 1 3 0" * 300
+    group = '<g id="b">' + '<use href="#a"/>' * 2**levels + "</g>"
+    path.write_text(f'<svg><defs><path id="a" d="{curve}"/>{group}</defs>{2**levels * """<use href="#b"/>"""}</svg>')
+
+
+def gltf(path, **parts):
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="<f4").tobytes()
+    uri = f"data:application/octet-stream;base64,{base64.b64encode(points).decode()}"
+    tree = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": uri, "byteLength": 48}],
+        "bufferViews": [{"buffer": 0, "byteLength": 48}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        **parts,
+    }
+    path.write_text(json.dumps(tree))
+
+
+def shared_primitives(path, levels):
+    n = 3000 * 2 ** (levels // 2)
+    data = base64.b64encode(bytes(12 * n)).decode()
+    gltf(
+        path,
+        buffers=[{"uri": f"data:,{data}", "byteLength": 12 * n}],
+        bufferViews=[{"buffer": 0, "byteLength": 12 * n}],
+        accessors=[{"bufferView": 0, "componentType": 5126, "count": n, "type": "VEC3"}],
+        meshes=[{"primitives": [{"attributes": {"POSITION": 0}}] * 2**levels}],
+    )
+
+
+def own_buffers(path, levels):
+    gltf(path, buffers=[{"uri": path.name, "byteLength": 9}] * 2**levels, meshes=[{"primitives": []}])
+
+
+def shared_pieces(path, levels):
+    n = 1000 * 2 ** (levels // 2)
+    piece = (
+        f'<Piece NumberOfPoints="{n}"><Points><DataArray type="Float64" format="appended" offset="0" '
+        'NumberOfComponents="3"/></Points></Piece>'
+    )
+    head = f'<VTKFile type="PolyData" header_type="UInt64"><PolyData>{2**levels * piece}</PolyData>'
+    data = np.array(24 * n, dtype="<u8").tobytes() + np.arange(3 * n, dtype="<f8").tobytes()
+    path.write_bytes(head.encode() + b'<AppendedData encoding="raw">_' + data + b"</AppendedData></VTKFile>")
+
+
+EXPANSIONS = {
+    "components": ("a.3mf", doubled_3mf, sh.read, 26),
+    "uses": ("a.svg", doubled_svg, sh.io.read_polylines, 40),
+    "curves": ("a.svg", used_curves, sh.io.read_polylines, 6),
+    "primitives": ("a.gltf", shared_primitives, sh.read, 12),
+    "pieces": ("a.vtp", shared_pieces, sh.read, 13),
+}
+"""Files that double with each level, and the levels that are too many; half of them are read."""
+
+
+@pytest.mark.parametrize("name", EXPANSIONS)
+def test_what_is_used_again_and_again_is_counted_before_it_is_made(tmp_path, name):
+    file, write, read, levels = EXPANSIONS[name]
+    path = tmp_path / file
+    write(path, levels)
+    begin = time.process_time()
+    with refused(SignedHeatError, file=file):
+        read(path)
+    write(path, 4)
+    read(path)
+    assert time.process_time() - begin < SECONDS
+    with refused(SignedHeatError, file=file), sh.io.Budget(elements=1, points=1):
+        read(path)
+
+
+def test_components_at_any_depth_are_where_their_matrices_place_them(tmp_path):
+    """Eight triangles along x from three levels, each of which places the one below twice."""
+    parts = "".join(
+        f'<object id="{k}"><components><component objectid="{k - 1}"/><component objectid="{k - 1}" '
+        f'transform="1 0 0 0 1 0 0 0 1 {2 ** (k - 1)} 0 0"/></components></object>'
+        for k in (1, 2, 3)
+    )
+    three_mf(tmp_path / "a.3mf", f'<object id="0">{TRIANGLE}</object>{parts}', [3])
+    mesh = sh.read(tmp_path / "a.3mf")
+    assert mesh.vertices[mesh.faces[:, 0]].tolist() == [[x, 0, 0] for x in range(8)]
+
+
+def test_a_file_that_is_its_own_buffer_is_read_once(tmp_path, monkeypatch):
+    opened = []
+    contents = budgets.charge
+    monkeypatch.setattr("signedheat.io.files.charge", lambda **given: opened.append(given) or contents(**given))
+    own_buffers(tmp_path / "a.gltf", 10)
+    with refused(FileFormatError):
+        sh.read(tmp_path / "a.gltf")
+    assert len(opened) == 2
+
+
+def test_cells_of_as_many_kinds_as_there_are_cells(tmp_path):
+    n = 20_000
+    arrays = "".join(
+        f'<DataArray type="Int64" Name="{name}" format="ascii">{" ".join(map(str, values))}</DataArray>'
+        for name, values in (
+            ("connectivity", range(n)), ("offsets", range(1, n + 1)), ("types", range(1000, n + 1000)),
+        )
+    )  # fmt: skip
+    points = f'<DataArray type="Float64" format="ascii">{" ".join(["0.5"] * 3 * n)}</DataArray>'
+    (tmp_path / "a.vtu").write_text(
+        f'<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="{n}" NumberOfCells="{n}">'
+        f"<Points>{points}</Points><Cells>{arrays}</Cells></Piece></UnstructuredGrid></VTKFile>"
+    )
+    begin = time.process_time()
+    with refused(SignedHeatError):
+        sh.read(tmp_path / "a.vtu")
+    assert time.process_time() - begin < SECONDS
+
+
+def packed(path, ending, n):
+    """An image of n³ zeros, which take no place in the file."""
+    zeros = np.zeros((n, n, n), dtype=np.uint8)
+    if ending == "nrrd":
+        head = f"NRRD0004\ntype: uchar\ndimension: 3\nsizes: {n} {n} {n}\nencoding: gzip\n\n"
+        path.write_bytes(head.encode() + gzip.compress(zeros.tobytes(), 6))
+    else:
+        np.savez_compressed(path, values=zeros.astype(float), origin=np.zeros(3), spacing=np.ones(3))
+
+
+@pytest.mark.parametrize("ending", ["nrrd", "npz"])
+def test_packed_values_are_counted_with_their_copies(tmp_path, ending, monkeypatch):
+    path, n = tmp_path / f"a.{ending}", 64
+    packed(path, ending, n)
+    size = n**3 * (8 if ending == "npz" else 1)
+    monkeypatch.setattr(budgets, "available_memory", lambda: int(0.99 * size))
+    with refused(MemoryLimitError, file=path.name):
+        sh.load_field(path)
+    monkeypatch.setattr(budgets, "available_memory", lambda: 7 * size)
+    sh.load_field(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.svg", "<svg>" + "<g/>" * 20_000 + "</svg>"),
+        ("a.svg", "<svg>" + "<g a='' b='' c='' d=''/>" * 5_000 + "</svg>"),
+        ("a.gltf", '{"a":[' + "[],{}," * 20_000 + "0]}"),
+        ("a.json", '{"polylines":[' + "{}," * 20_000 + "0]}"),
+        ("a.obj", "v 0 0 0\n" + "f 1 1 1\n" * 5_000),
+        ("a.off", "OFF\n3 0 0\n" + "1\n" * 30_000),
+        ("a.csv", "1 1\n" * 5_000),
+        ("a.stl", "solid a facet\n" + "1 " * 20_000),
+    ],
+)
+def test_texts_are_charged_for_their_words_and_trees(tmp_path, name, content):
+    """Of two bytes become a hundred and more."""
+    (tmp_path / name).write_text(content)
+    read = {
+        "svg": sh.io.read_polylines,
+        "csv": sh.io.read_polylines,
+        "json": lambda path: sh.io.read_curves(path, samples.sphere(1)),
+    }.get(name[2:], sh.read)
+    with sh.io.Budget(bytes=8 * len(content)), refused(MemoryLimitError, file=name):
+        read(tmp_path / name)
+
+
+def test_budgets_are_set_within_each_other(tmp_path):
+    path = tmp_path / "ball.ply"
+    samples.sphere(3).save(path)
+    with sh.io.Budget(bytes=1e9):
+        with refused(MemoryLimitError, file="ball.ply"), sh.io.Budget(bytes=100):
+            sh.read(path)
+        sh.read(path)
+    sh.read(path)
+
+
+def test_processor_time_is_charged(tmp_path):
+    path = tmp_path / "a.svg"
+    doubled_svg(path, 14)
+    with sh.io.Budget(seconds=1e-3), refused(FileFormatError, file="a.svg"):
+        sh.io.read_polylines(path)
+    assert len(sh.io.read_polylines(path)) == 2**14
+
+
+@pytest.mark.parametrize("name", ["bytes", "elements", "points", "seconds"])
+@pytest.mark.parametrize("value", [0, -1, float("nan"), float("inf"), "1", True])
+def test_limits_are_positive_numbers(name, value):
+    with refused(SignedHeatError, name):
+        sh.io.Budget(**{name: value})
+
+
+# -- texts of any length --
+
+
+def test_messages_quote_no_more_than_a_line(tmp_path):
+    for name, content in {
+        "a.ply": "ply\nformat ascii 1.0\nproperty " + "a" * 100_000 + "\nend_header\n",
+        "a.obj": "a" * 100_000 + " 1 2 3\n",
+        "a.gltf": json.dumps({"asset": {"version": "2.0"}, "extensionsRequired": ["a" * 100_000]}),
+        "a.nrrd": f"NRRD0004\ntype: {'a' * 100_000}\ndimension: 1\nsizes: 3\nencoding: raw\n\n",
+        "a.pcd": f"FIELDS {' '.join('abc' * 50_000)}\nDATA ascii\n",
+        "a.vtp": f'<VTKFile type="{"a" * 100_000}"/>',
+    }.items():
+        (tmp_path / name).write_text(content)
+        with refused(SignedHeatError, file=name) as caught:
+            sh.read(tmp_path / name)
+        error = caught.value
+        assert all(len(text or "") <= LONGEST_TEXT for text in (error.cause, error.remedy, error.element))
+
+
+SOURCE = Path(sh.__file__).parent
+PATTERN = re.compile(
+    r're\.(compile|findall|finditer|fullmatch|match|search|split|sub)\(\s*(rb?|br)(["\'])(.*?)(?<!\\)\3'
+)
+
+
+def patterns():
+    """All regular expressions of the package, and how they are used; those with a name are matched from a place on."""
+    used = {(m[4], m[1]) for file in SOURCE.rglob("*.py") for m in PATTERN.finditer(file.read_text())}
+    assert len(used) > 5
+    ways = {"compile": ("match", "fullmatch"), "sub": ("findall",), "split": ("findall",), "finditer": ("findall",)}
+    return sorted((pattern, way) for pattern, use in used for way in ways.get(use, (use,)))
+
+
+@pytest.mark.parametrize(("pattern", "way"), patterns())
+def test_regular_expressions_are_linear(pattern, way):
+    """On whatever repeats and then ends in what does not match."""
+    n = 10_000
+    words = {*re.findall(r"[A-Za-z-]{3,}", pattern), " ", "1", "a", "1,", "1.", "-", "(", "\\ ", "\n", "1e", "$a"}
+    begin = time.process_time()
+    for word in sorted(words):
+        for text in (word * n, (word + " ") * n, word + " " * n, word * n + "\0", word + "1" * n + "x", word + "(" * n):
+            getattr(re, way)(pattern, text)
+    assert time.process_time() - begin < SECONDS
