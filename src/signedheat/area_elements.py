@@ -14,7 +14,6 @@ from math import gamma, pi
 from typing import Any
 
 import numpy as np
-import scipy
 
 from .arrays import Floats, Ints
 from .errors import CancellingNormalsError, SourceError
@@ -27,6 +26,7 @@ from .mesh.components import element_components
 from .mesh.triangles import AREA_ROUNDING, area_vectors
 from .mesh.unit_vectors import unit
 from .mesh.welding import same_positions
+from .parallel import PointTree
 from .surfaces.plane_fits import POINT_NEIGHBORS
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
@@ -131,7 +131,7 @@ def point_areas(points: Floats) -> Floats:
     k = min(POINT_NEIGHBORS, len(places) - 1)
     if dimension == 0 or k == 0:
         return np.ones(len(points)) / counts[which.ravel()]
-    reach = scipy.spatial.cKDTree(places).query(places, k=[k + 1], workers=-1)[0][:, 0]
+    reach = PointTree(places).query(places, k=[k + 1])[0][:, 0]
     unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
     areas: Floats = unit_ball * reach**dimension / k / counts
     return areas[which.ravel()]

@@ -24,7 +24,7 @@ from typing import Any, Generic, ParamSpec, TypeVar, overload
 import numpy as np
 
 from .errors import SignedHeatError
-from .jobs import MOST_THREADS, Announcement
+from .jobs import MOST_THREADS, Announcement, interruptible, stop_if_abandoned
 from .packages import lazy_module
 
 numba: Any = lazy_module("numba", "compiled kernels")
@@ -33,6 +33,8 @@ extending: Any = lazy_module("numba.extending", "compiled kernels")
 logger: logging.Logger = logging.getLogger("signedheat")
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Options of ``numba.njit``: division by zero raises nothing, and no wrapper for calls from C is compiled."""
+SHORT = 1 << 13
+"""Number of entries of arrays up to which a kernel is too short for anybody to interrupt it."""
 WORD = re.compile(r"\w+")
 DAMAGE = OSError, EOFError, UnpicklingError
 """Errors of a cache whose files are damaged or cannot be written. Kernels raise none of them."""
@@ -56,13 +58,20 @@ class Kernel(Generic[Parameters, Returned]):
         update_wrapper(self, function)
         self.function = function
         self.options: dict[str, Any] = {**OPTIONS, **options}
+        self._is_warm = False
 
     def __call__(self, *arguments: Parameters.args, **named: Parameters.kwargs) -> Returned:
         try:
-            return self.dispatcher(*arguments, **named)
+            if self._is_warm and _entries(arguments) <= SHORT:
+                stop_if_abandoned()
+                return self.dispatcher(*arguments, **named)
+            returned = interruptible(self._compiled_call, *arguments, **named)
+            self._is_warm = True
+            return returned
         except Exception as error:
-            if isinstance(error.__cause__, KeyboardInterrupt):  # Numba raises a SystemError from it
-                raise error.__cause__ from None
+            for each in _chain(error):
+                if isinstance(each, KeyboardInterrupt):  # Numba and Python raise SystemErrors because of it
+                    raise each from None
             if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
                 raise
             logger.warning("the cache of compiled kernels is not used any more: %s", error)
@@ -72,6 +81,10 @@ class Kernel(Generic[Parameters, Returned]):
                 kernel = vars(made.pop())
                 kernel.pop("dispatcher", None)
                 kernel.pop("part", None)
+        return interruptible(self._compiled_call, *arguments, **named)
+
+    def _compiled_call(self, *arguments: Parameters.args, **named: Parameters.kwargs) -> Returned:
+        """Compile what is not, and call it: neither may be interrupted, nor may the import of Numba."""
         return self.dispatcher(*arguments, **named)
 
     @cached_property
@@ -186,6 +199,17 @@ def _spelled(value: Any) -> Any:
     if isinstance(value, CodeType):
         return value.co_code, value.co_names, [_spelled(constant) for constant in value.co_consts]
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value
+
+
+def _entries(arguments: Iterable[Any]) -> int:
+    """Count the entries of all arrays among the arguments of a kernel, also in tuples."""
+    count = 0
+    for value in arguments:
+        if isinstance(value, np.ndarray):
+            count += value.size
+        elif isinstance(value, tuple):
+            count += _entries(value)
+    return count
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:

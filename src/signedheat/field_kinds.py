@@ -7,7 +7,6 @@ from functools import singledispatch
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy
 from scipy import sparse
 
 from .arrays import Bools, Floats, mask_of
@@ -17,6 +16,7 @@ from .geodesics.exact_distance import shortest_arcs
 from .grids.grid_discretization import GridDiscretization, GridSource
 from .grids.grid_field import GridField
 from .mesh.components import connected_components
+from .parallel import PointTree
 from .surfaces.plane_fits import POINT_NEIGHBORS
 from .surfaces.point_cloud import PointCloud
 from .surfaces.surface_discretization import SurfaceDiscretization
@@ -138,7 +138,7 @@ def spread(points: Floats, values: Floats, used: Bools) -> Floats:
     ids = np.flatnonzero(used)
     if not lacking.any() or len(ids) <= POINT_NEIGHBORS:
         return values
-    far, near = scipy.spatial.cKDTree(points[ids]).query(points[ids], k=POINT_NEIGHBORS + 1)
+    far, near = PointTree(points[ids]).query(points[ids], k=POINT_NEIGHBORS + 1)
     rows = np.repeat(np.arange(len(ids)), POINT_NEIGHBORS)
     graph = sparse.csr_matrix(
         (np.maximum(far[:, 1:].ravel(), 1e-300), (rows, near[:, 1:].ravel())), shape=(len(ids),) * 2

@@ -6,11 +6,13 @@ import json
 import logging
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from threading import Thread
 from typing import Any, TypeVar
@@ -92,22 +94,57 @@ ENTRY_PROGRAM = (
 """Program of a new process: the process starts isolated, and then takes over the import path of this one."""
 
 
-def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
-    """Run a job on its own thread, call `report` every tenth of a second until it ends, and return its result.
+class Abandoned(BaseException):
+    """Raised in a thread whose result nobody waits for any more."""
 
-    An exception from `report` is raised at once; the job then runs on in the background and its result is dropped.
-    """
-    if report is None:
-        return job()
-    future: Future[Any] = Future()
+
+@dataclass(eq=False)
+class Flag:
+    """Tells a thread, and those that it starts, whether anybody waits for its result."""
+
+    parent: Flag | None
+    is_raised: bool = False
+
+
+_thread = threading.local()
+
+
+def own_flag() -> Flag:
+    """Return a new flag for jobs that this thread starts."""
+    return Flag(getattr(_thread, "flag", None))
+
+
+def stop_if_abandoned() -> None:
+    """Raise `Abandoned` in a thread whose result nobody waits for any more."""
+    flag: Flag | None = getattr(_thread, "flag", None)
+    while flag is not None:
+        if flag.is_raised:
+            raise Abandoned
+        flag = flag.parent
+
+
+def start_thread(job: Callable[[], None], flag: Flag) -> Thread:
+    """Start a job on a thread that obeys a flag, and that does not keep the process alive."""
 
     def run() -> None:
-        try:
-            future.set_result(job())
-        except BaseException as error:
-            future.set_exception(error)
+        _thread.flag = flag
+        job()
 
-    Thread(target=run, daemon=True).start()
+    thread = Thread(target=run, daemon=True)
+    thread.start()
+    return thread
+
+
+def settle(future: Future[Any], job: Callable[[], Any]) -> None:
+    """Run a job, and store its result or its exception."""
+    try:
+        future.set_result(job())
+    except BaseException as error:
+        future.set_exception(error)
+
+
+def awaited(future: Future[Result], report: Callable[[], None] = stop_if_abandoned) -> Result:
+    """Wait for a result and call `report` every tenth of a second; what it raises, and Ctrl-C, ends the wait."""
     while True:
         try:
             return future.result(0.1)
@@ -115,6 +152,40 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
             if future.done():  # the job itself raised the error
                 raise
             report()
+
+
+def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
+    """Run a job on its own thread, call `report` every tenth of a second until it ends, and return its result.
+
+    An exception from `report` is raised at once, and so is Ctrl-C; the job then ends at the next kernel that it calls.
+    """
+    if report is None:
+        return job()
+    future: Future[Any] = Future()
+    flag = own_flag()
+    try:
+        start_thread(partial(settle, future, job), flag)
+        return awaited(future, report)
+    except BaseException:
+        flag.is_raised = True
+        raise
+
+
+def interruptible(function: Callable[..., Result], *arguments: Any, **named: Any) -> Result:
+    """Call a function of compiled code, which cannot be interrupted, so that Ctrl-C ends the wait for it.
+
+    Python handles signals on its main thread, between two instructions. There, the function runs on another thread.
+    After Ctrl-C it runs on to its end, which nobody waits for, and keeps alive what it uses.
+    """
+    stop_if_abandoned()
+    if threading.get_ident() != threading.main_thread().ident:
+        return function(*arguments, **named)
+    future: Future[Result] = Future()
+    try:
+        start_thread(partial(settle, future, partial(function, *arguments, **named)), own_flag())
+    except RuntimeError:  # no more threads can be started
+        return function(*arguments, **named)
+    return awaited(future)
 
 
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:

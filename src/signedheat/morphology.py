@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from .area_elements import bounds_around
@@ -34,6 +33,7 @@ from .grids.polyline import Polyline
 from .jobs import Progress
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .mesh.triangles import part_volumes
+from .parallel import PointTree
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
 from .solids.completion import complete
@@ -581,7 +581,7 @@ def _linear(shape: Shapes, values: Floats) -> Reach:
             element="distance",
         )
     if isinstance(mesh, PointCloud):
-        tree = scipy.spatial.cKDTree(points)
+        tree = PointTree(points)
         return lambda places: values[tree.query(places)[1]]
     if not isinstance(mesh, TriangleMesh):
         values, mesh = mesh.on_triangulation(values), mesh.triangulation

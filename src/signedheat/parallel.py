@@ -1,4 +1,4 @@
-"""Functions applied to rows of arrays on several threads, and connections to Dask clusters."""
+"""Functions applied to rows of arrays on several threads, trees of points, and connections to Dask clusters."""
 
 from __future__ import annotations
 
@@ -6,14 +6,19 @@ import os
 import socket
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
+from functools import partial
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any, TypeVar
 
 import numpy as np
+import scipy.spatial
 from numpy.typing import NDArray
 
+from .arrays import Floats
 from .errors import SignedHeatError
-from .jobs import run_limited
+from .jobs import awaited, interruptible, own_flag, run_limited, settle, start_thread, stop_if_abandoned
 from .packages import lazy_module
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
@@ -57,19 +62,74 @@ def in_chunks(
 
 
 def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """Yield the results of a function in the order of its arguments, from all threads, and hold few at a time."""
-    with ThreadPoolExecutor(n_threads()) as pool:
-        jobs: deque[Future[Result]] = deque()
-        try:
-            for item in items:
-                jobs.append(pool.submit(function, item))
-                if len(jobs) > 2 * n_threads():
-                    yield jobs.popleft().result()
-            while jobs:
-                yield jobs.popleft().result()
-        finally:
-            for job in jobs:
-                job.cancel()
+    """Yield the results of a function in the order of its arguments, from all threads, and hold few at a time.
+
+    After Ctrl-C, threads end when their item or the next kernel does, and are not waited for.
+    """
+    tasks: SimpleQueue[tuple[Future[Result], Callable[[], Result]] | None] = SimpleQueue()
+
+    def work() -> None:
+        while (task := tasks.get()) is not None:
+            settle(*task)
+
+    def guarded(item: Item) -> Result:
+        stop_if_abandoned()
+        return function(item)
+
+    flag, most = own_flag(), n_threads()
+    threads: list[Thread] = []
+    jobs: deque[Future[Result]] = deque()
+    try:
+        for item in items:
+            jobs.append(Future())
+            tasks.put((jobs[-1], partial(guarded, item)))
+            if len(threads) < most:
+                threads.append(start_thread(work, flag))
+            if len(jobs) > 2 * most:
+                yield awaited(jobs.popleft())
+        while jobs:
+            yield awaited(jobs.popleft())
+    except BaseException as error:
+        flag.is_raised = True
+        if not isinstance(error, Exception):  # Ctrl-C, or nobody wants the rest
+            threads.clear()
+        raise
+    finally:
+        for _ in range(most):
+            tasks.put(None)
+        for thread in threads:
+            thread.join()
+
+
+class PointTree(scipy.spatial.cKDTree):  # type: ignore[misc]  # SciPy has no types
+    """SciPy's tree of points, with queries on threads of ours: SciPy's own crash after Ctrl-C.
+
+    They use the tree after it has been freed.
+    """
+
+    def __init__(self, points: Floats, **options: Any) -> None:
+        if len(points) <= ROWS_PER_TASK:
+            super().__init__(points, **options)
+        else:
+            interruptible(super().__init__, points, **options)
+
+    def query(self, x: Any, k: Any = 1, **options: Any) -> tuple[Any, Any]:
+        """Return the distances and indices of the `k` nearest points of each row, as SciPy does."""
+        rows = np.asarray(x, dtype=np.float64)
+        if rows.ndim != 2 or len(rows) <= ROWS_PER_TASK:
+            return super().query(rows, k, **options)
+        search = partial(super().query, k=k, **options)
+        distances, indices = in_chunks(search, rows)
+        return distances, indices
+
+    def query_ball_point(self, x: Any, r: Any, **options: Any) -> Any:
+        """Return lists of the points within a radius of each row, as SciPy does."""
+        rows = np.asarray(x, dtype=np.float64)
+        if rows.ndim != 2 or len(rows) <= ROWS_PER_TASK:
+            return super().query_ball_point(rows, r, **options)
+        search, radii = super().query_ball_point, np.broadcast_to(np.asarray(r, dtype=np.float64), len(rows))
+        (near,) = in_chunks(lambda own: (search(rows[own], radii[own], **options),), np.arange(len(rows)))
+        return near
 
 
 def connected(address: str) -> Any:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
-import scipy
 
 from ..arrays import Floats, Ints, mask_of
 from ..calls import public_call
@@ -19,6 +18,7 @@ from ..jobs import Progress
 from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..parallel import PointTree
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
@@ -168,7 +168,7 @@ def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list
     kept, _ = given_curves(field.domain, as_list(curves))
     given = [each for each in flattened(kept) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
-    near = scipy.spatial.cKDTree(np.concatenate([field.domain.positions(each) for each in given]))
+    near = PointTree(np.concatenate([field.domain.positions(each) for each in given]))
     completing = [  # open curves end at the rim, and are no stray loops
         curve
         for curve in contour

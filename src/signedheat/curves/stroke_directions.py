@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-import scipy
 
 from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr, mask_of
 from ..errors import UnsupportedTypeError
@@ -17,7 +16,7 @@ from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.signed_graph import best_signs
-from ..parallel import in_threads
+from ..parallel import PointTree, in_threads
 from ..solver import SignedHeatSolver
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others
@@ -176,7 +175,7 @@ def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
     group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
     # a gap is from the end of a curve to the nearest beginning: the nearest end may be that of a copy
-    away = scipy.spatial.cKDTree(ends[::2]).query(ends[1::2])[0]
+    away = PointTree(ends[::2]).query(ends[1::2])[0]
     return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
 
 

@@ -25,7 +25,7 @@ from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..jobs import Progress, run_cancellable
 from ..packages import lazy_module
-from ..parallel import in_threads
+from ..parallel import PointTree, in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_field, timed
 from ..validation import array_of, flag, numbers, positive_steps
@@ -258,7 +258,7 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
 
 def distances_to(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -> Floats:
     """Return unsigned distances to the zero set of the nodes of a grid with four axes, given its first node."""
-    distances, zeros = np.full(tuple(shape), np.inf), scipy.spatial.cKDTree(contour.zeros)
+    distances, zeros = np.full(tuple(shape), np.inf), PointTree(contour.zeros)
     side = BLOCK * max(1, round(TILE_NODES ** (1 / max((shape > 1).sum(), 1)) / BLOCK))
     measured = _to_triangles(contour, origin, steps, shape) if len(contour.faces) else _to_crossings(contour)
 
@@ -296,7 +296,7 @@ def _to_triangles(contour: Contour, origin: Floats, steps: Floats, shape: Ints) 
 
 def _to_crossings(contour: Contour) -> Measured:
     """Return a function that measures the nodes of a grid with four axes to the nearest crossings, if there are any."""
-    crossings = scipy.spatial.cKDTree(contour.points)
+    crossings = PointTree(contour.points)
 
     def measured(first: Ints, stop: Ints, places: Floats) -> Floats:
         if not len(contour.points):

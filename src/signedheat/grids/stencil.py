@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
+from ..jobs import interruptible
 from ..parallel import in_threads, n_threads
 
 FEW_NODES = 100_000
@@ -50,7 +51,7 @@ def laplacian(values: Floats, spacing: Floats) -> Floats:
 def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = False) -> Floats:
     """Return φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C."""
     workers = n_threads()
-    transformed = scipy.fft.dctn(right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
+    transformed = interruptible(scipy.fft.dctn, right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
     eigenvalues = [
         (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) / h**2
         for n, h in zip(right_hand_side.shape, spacing, strict=True)
@@ -58,7 +59,7 @@ def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = Fa
     padded = padded_shape(transformed.shape)
     eigenvalues = [np.zeros(1)] * (4 - len(eigenvalues)) + eigenvalues
     by_slabs(padded, _divide, eigenvalues, transformed.reshape(padded))
-    return scipy.fft.idctn(transformed, type=2, overwrite_x=True, workers=workers)
+    return interruptible(scipy.fft.idctn, transformed, type=2, overwrite_x=True, workers=workers)
 
 
 def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[Ints, Floats]:

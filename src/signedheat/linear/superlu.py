@@ -16,6 +16,7 @@ from scipy.sparse.linalg import splu
 from ..arrays import Floats
 from ..compiled import compiled
 from ..errors import FactorizationError
+from ..jobs import interruptible
 from .ordering import elimination_order, whole
 from .threads import one_blas_thread
 
@@ -35,7 +36,8 @@ class SuperLUFactor:
         matrix = whole(upper)[self._order][:, self._order]
         with one_blas_thread():  # its dense blocks are tiny: threads cost ten times what they gain
             try:
-                factor = splu(
+                factor = interruptible(
+                    splu,
                     sparse.csc_matrix(matrix),
                     permc_spec="NATURAL",
                     diag_pivot_thresh=0.0,

@@ -14,13 +14,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, first_members, sums_of
 from ..mesh.triangles import area_vectors, cone_volumes
 from ..mesh.unit_vectors import unit
+from ..parallel import PointTree
 from ..search.winding_tree import WindingTree
 from .chain import Chain
 from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
@@ -402,7 +402,7 @@ def clusters_of(pieces: Pieces) -> Ints:
     elements = without_slender(pieces)
     faces, places = sampled(elements, min(len(elements.labels), 100_000))
     owners = elements.labels[faces]
-    away, near = scipy.spatial.cKDTree(places).query(places, min(9, len(places)), workers=-1)  # itself and 8
+    away, near = PointTree(places).query(places, min(9, len(places)))  # itself and 8
     away, others = away.reshape(len(places), -1), owners[near].reshape(len(places), -1)
     joined = away < 2 * GAP_REACH * np.minimum(radii[owners][:, None], radii[others])
     return connected_components(n, np.repeat(owners, joined.sum(axis=1)), others[joined])

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-import scipy
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of
@@ -23,6 +22,7 @@ from ..mesh.components import connected_components, element_components, first_me
 from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
+from ..parallel import PointTree
 from . import lids, walls
 from .lids import Lid, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges, turning
@@ -63,9 +63,7 @@ def width_of(lid: Lid) -> float:
     return max(4.0 * float(face_areas(lid.vertices[lid.faces]).sum()) / length, 1e-9 * length)
 
 
-def samples_near(
-    triangles: Floats, tree: BoxTree, patches: Ints, rim: scipy.spatial.cKDTree, reach: float
-) -> RimSamples:
+def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: PointTree, reach: float) -> RimSamples:
     """Sample the triangles within reach of a rim, at most reach / `STRIP_SAMPLES` apart unless these are too many."""
     size = reach / STRIP_SAMPLES
     near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
@@ -141,7 +139,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
 
 def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
     """Pair each place of a rim with the samples within reach that belong to the patch ending there; and distances."""
-    rim, near = scipy.spatial.cKDTree(loop), scipy.spatial.cKDTree(samples.positions)
+    rim, near = PointTree(loop), PointTree(samples.positions)
     pairs = rim.sparse_distance_matrix(near, reach, output_type="ndarray")
     pairs = pairs[samples.patches[pairs["j"]] == patches[pairs["i"]]]
     return pairs["i"], pairs["j"], pairs["v"]
@@ -500,9 +498,7 @@ def _spanned(
     plate = None
     if bends:
         width, points = width_of(flat), flat.vertices[: flat.n_rim]
-        near = samples_near(
-            surface.triangles, surface.tree, surface.patches, scipy.spatial.cKDTree(points), STRIP_WIDTH * width
-        )
+        near = samples_near(surface.triangles, surface.tree, surface.patches, PointTree(points), STRIP_WIDTH * width)
         ends = surface.patches[behind[rim.edges_at(flat.places)]]
         normals, curvatures, held = continuation(flat, near, ends, width)
         plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None

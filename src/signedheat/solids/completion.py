@@ -11,7 +11,6 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-import scipy
 
 from ..arrays import Floats, Ints
 from ..calls import public_call
@@ -28,6 +27,7 @@ from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
 from ..mesh.welding import indexed, tolerances
+from ..parallel import PointTree
 from ..search.face_tree import FaceTree
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -66,7 +66,7 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
     places = np.concatenate([vertices, points])
     ends, border = np.append(np.unique(rim), names), np.unique(tails)
     nearest = np.zeros(len(vertices), dtype=np.int64)
-    nearest[border] = ends[scipy.spatial.cKDTree(places[ends]).query(vertices[border])[1]]
+    nearest[border] = ends[PointTree(places[ends]).query(vertices[border])[1]]
     strip = np.concatenate(
         [np.stack([tails, heads, nearest[heads]], axis=1), np.stack([tails, nearest[heads], nearest[tails]], axis=1)]
     )
@@ -370,7 +370,7 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
     """Return the median distance between corners that noise has separated; 0 if it has not separated most of them."""
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
-    near, neighbours = scipy.spatial.cKDTree(points).query(points, min(8, len(points)), workers=-1)
+    near, neighbours = PointTree(points).query(points, min(8, len(points)))
     others = owners[neighbours] != owners[:, None]
     nearest = np.where(others, near, np.inf).min(axis=1)
     sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)

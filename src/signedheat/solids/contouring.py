@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, mask_of
@@ -41,7 +40,7 @@ from ..mesh.dual_cells import (
 from ..mesh.edges import CLEARANCE
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
-from ..parallel import in_threads
+from ..parallel import PointTree, in_threads
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..words import percent
 from .gauss import Pieces, sampled
@@ -173,9 +172,9 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
     if len(rows):
         rows = rows[np.argsort(away[rows], kind="stable")]
         settled = np.where(in_cell[:, None], wider, vertices)
-        near = scipy.spatial.cKDTree(settled).query_ball_point(wider[rows], VERTEX_SPACING, workers=-1)
+        near = PointTree(settled).query_ball_point(wider[rows], VERTEX_SPACING)
         rows = rows[[set(others) <= {row} for row, others in zip(rows, near, strict=True)]]
-        first, second = scipy.spatial.cKDTree(wider[rows]).query_pairs(VERTEX_SPACING, output_type="ndarray").T
+        first, second = PointTree(wider[rows]).query_pairs(VERTEX_SPACING, output_type="ndarray").T
         in_cell[np.delete(rows, np.maximum(first, second))] = True
     return in_cell
 
@@ -239,7 +238,7 @@ def divided_along_creases(
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
         if not len(edges):
             break
-        away, _ = scipy.spatial.cKDTree(points).query(vertices, distance_upper_bound=CROSS_REACH * float(spacing.max()))
+        away, _ = PointTree(points).query(vertices, distance_upper_bound=CROSS_REACH * float(spacing.max()))
         divided, made = _divided(vertices, faces, edges, points)
         new = asked = np.any(made >= len(vertices), axis=1)
         while len(edges):

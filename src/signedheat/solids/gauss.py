@@ -30,7 +30,7 @@ from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from ..mesh.components import numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas, halved, side_lengths
 from ..mesh.unit_vectors import unit
-from ..parallel import in_chunks
+from ..parallel import PointTree, in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
 
 WEIGHT_DAMPING = 0.01
@@ -347,7 +347,7 @@ class Dipoles:
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
     """(k, k) signed Laplacian, times μ, of pieces with neighbours roughly in a plane; weak if they have many places."""
     n, k = len(places), min(PLANE_NEIGHBORS, len(places) - 1)
-    near = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
+    near = PointTree(places).query(places, k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
     apart = owners[tails] != owners[heads]
     tails, heads = tails[apart], heads[apart]
@@ -369,7 +369,7 @@ def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> 
 def spacing(places: Floats) -> Floats:
     """(n,) mean distance of each place to its four nearest neighbours."""
     k = min(4, len(places) - 1)
-    distances = scipy.spatial.cKDTree(places).query(places, k + 1, workers=-1)[0].reshape(len(places), -1)
+    distances = PointTree(places).query(places, k + 1)[0].reshape(len(places), -1)
     return np.asarray(distances[:, 1:].mean(axis=1)) if k else np.ones(len(places))
 
 

@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 from scipy import sparse
 
 from ..arrays import Floats, Ints
 from ..mesh.components import numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
+from ..parallel import PointTree
 from . import spanning
 from .rims import corners_of
 from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, spanned
@@ -138,7 +138,7 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tup
         inner = np.arange(n, len(over.plane))
     else:
         rim = (loop[edges] + shares[:, None] * ways[edges] - frame[0]) @ frame[1]
-        away = scipy.spatial.cKDTree(rim).query(over.plane[n:])[0]
+        away = PointTree(rim).query(over.plane[n:])[0]
         inner = n + np.flatnonzero(away > RIM_CLEARANCE * float(np.linalg.norm(ways, axis=1).sum()) / LOOP_POINTS)
         edges, shares = np.arange(len(loop)), np.zeros(len(loop))
         flat = (loop - frame[0]) @ frame[1]

@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 from scipy import sparse
 
@@ -25,6 +24,7 @@ from ..mesh.box_tree import BoxTree
 from ..mesh.components import grouped
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import unit
+from ..parallel import PointTree
 from ..search.winding_tree import WindingTree, mean_angle
 from .gauss import TREE_FACES, Dipoles, Matrix, Pieces, sampled
 from .winding import INSIDE_WINDING, SUMMED_POINTS
@@ -150,7 +150,7 @@ def bodies_around(
     own = homes >= 0
     away = np.flatnonzero(~own)
     if len(away):
-        homes[away] = homes[own][scipy.spatial.cKDTree(places[own]).query(places[away], workers=-1)[1]]
+        homes[away] = homes[own][PointTree(places[own]).query(places[away])[1]]
     normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
     sizes = np.concatenate([system.areas, rims.lengths])
     order = np.argsort(numbers, kind="stable")

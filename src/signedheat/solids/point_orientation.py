@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
 from ..arrays import Floats, Ints
 from ..diagnostics import OrientedPoints, StrayPoints
 from ..errors import GeometryError
 from ..mesh.unit_vectors import unit
-from ..parallel import in_chunks
+from ..parallel import PointTree, in_chunks
 from ..surfaces.point_cloud import PointCloud, outward_normals
 
 STRAY_DISTANCE = 3.0
@@ -27,7 +26,7 @@ def without_strays(cloud: PointCloud) -> tuple[PointCloud, list[StrayPoints]]:
     if many <= few:
         return cloud, []
     points = cloud.points[ids]
-    away, near = scipy.spatial.cKDTree(points).query(points, many + 1, workers=-1)
+    away, near = PointTree(points).query(points, many + 1)
     gaps = away[:, 1 : few + 1].mean(axis=1)
     strays = (gaps > STRAY_DISTANCE * np.median(gaps[near[:, 1:]], axis=1))[owners.ravel()]
     if not strays.any():
@@ -82,7 +81,7 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
     normals n_i: planes with normals n_i and n lie on opposite sides of a curved surface. Positions are relative to the
     first node. Points whose normals are against ∇φ do not count.
     """
-    tree = scipy.spatial.cKDTree(points)
+    tree = PointTree(points)
     n_neighbours = min(FIT_NEIGHBORS, len(points))
     gap = mean_gap(points)
     result = np.array(phi, dtype=np.float64)
@@ -111,7 +110,7 @@ def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
 
 def mean_gap(points: Floats) -> float:
     """Return the root of the area per point, taken from discs around (n, 3) points up to their sixth neighbours."""
-    reach = scipy.spatial.cKDTree(points).query(points, k=[min(7, len(points))])[0]
+    reach = PointTree(points).query(points, k=[min(7, len(points))])[0]
     return float(np.median(reach) * np.sqrt(np.pi / 7.0))
 
 

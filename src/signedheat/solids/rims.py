@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-import scipy
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
@@ -16,6 +15,7 @@ from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors, corner_normals
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
 from ..mesh.welding import same_positions, tolerances
+from ..parallel import PointTree
 from ..surfaces.triangle_mesh import TriangleMesh
 
 EDGE_PLACES = 8
@@ -144,7 +144,7 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
     places, owners = _places_on(ends)
-    tree, reach = scipy.spatial.cKDTree(places), ALONG_EDGE * lengths[owners]
+    tree, reach = PointTree(places), ALONG_EDGE * lengths[owners]
     crowded = np.flatnonzero(tree.query(places, 2)[0][:, 1] <= reach)  # each place finds itself, too
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
     first = np.repeat(crowded, [len(ids) for ids in near])
@@ -170,7 +170,7 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))[owners]
     for size in np.unique(sizes):
         asking = np.flatnonzero(sizes == size)
-        tree = scipy.spatial.cKDTree(np.concatenate([places / size, 2.0 * ways[owners]], axis=1))
+        tree = PointTree(np.concatenate([places / size, 2.0 * ways[owners]], axis=1))
         back = np.concatenate([places[asking] / size, -2.0 * ways[owners[asking]]], axis=1)
         near = tree.query(back, distance_upper_bound=2.0)[1]
         partners[asking[near < len(places)]] = near[near < len(places)]

@@ -11,6 +11,7 @@ from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
 from ..mesh.edges import edge_keys, edge_table
 from ..mesh.triangles import side_lengths
+from ..parallel import PointTree
 
 LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
@@ -151,7 +152,7 @@ def points_inside(polygon: Floats) -> Floats:
     steps = side_lengths(polygon)
     size = float(np.quantile(steps, 0.9))
     low, high = polygon.min(axis=0), polygon.max(axis=0)
-    tree = scipy.spatial.cKDTree(polygon)
+    tree = PointTree(polygon)
     layers = [np.zeros((0, 2))]
     begin = 0.75 * size
     while begin < 0.5 * float((high - low).max()):

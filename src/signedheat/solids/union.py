@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
@@ -22,6 +21,7 @@ from ..mesh.arrangement import SAME_POINT, Arrangement, arranged, meeting_faces
 from ..mesh.components import first_members
 from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
+from ..parallel import PointTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import concatenated
 from .bodies import same_solid
@@ -156,7 +156,7 @@ def _confidence(triangles: Floats, given: Bools, whole: TriangleGroup, points: F
         confidence[~given] = 0.5
         return confidence
     diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    away = scipy.spatial.cKDTree(points).query(triangles[~given].mean(axis=1), workers=-1)[0]
+    away = PointTree(points).query(triangles[~given].mean(axis=1))[0]
     trust = TRUST_DISTANCE * diagonal / np.maximum(TRUST_DISTANCE * diagonal + away, np.finfo(float).tiny)
     confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
     return confidence

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from ..arrays import Floats, Ints
 from ..mesh.components import connected_components, next_in_groups
 from ..mesh.unit_vectors import SAME_WAY, unit
+from ..parallel import PointTree
 from .lids import cut_to_pieces
 from .rims import ALONG_EDGE, corners_of, opposite_edges
 from .spanning import area_vector
@@ -147,7 +147,7 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
     if len(rims) < 2:
         return []
     centres, widths = np.array([rim.centre for rim in rims]), []
-    for i, near in enumerate(scipy.spatial.cKDTree(centres).query_ball_point(centres, [rim.radius for rim in rims])):
+    for i, near in enumerate(PointTree(centres).query_ball_point(centres, [rim.radius for rim in rims])):
         larger = rims[i]
         for j in near:
             smaller = rims[j]
@@ -181,7 +181,7 @@ def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
     steps = np.linalg.norm(base, axis=1)
     base /= np.maximum(steps, 1e-300)[:, None]
     middles = rim.corners + 0.5 * along
-    nearest = scipy.spatial.cKDTree(places).query(middles)[1]
+    nearest = PointTree(places).query(middles)[1]
     across = places[nearest] - middles
     across -= np.clip((across * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
     return float(lengths @ np.linalg.norm(across, axis=1)), float(lengths @ (across * rim.onward).sum(axis=1))
@@ -189,7 +189,7 @@ def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
 
 def strip(one: Rim, other: Rim) -> Ints:
     """(k, 3) vertices of triangles between rims that run opposite ways, from their two nearest corners on."""
-    away, nearest = scipy.spatial.cKDTree(other.corners).query(one.corners)
+    away, nearest = PointTree(other.corners).query(one.corners)
     start = int(np.argmin(away))
     i = (start + np.arange(len(one.ids) + 1)) % len(one.ids)
     j = (nearest[start] - np.arange(len(other.ids) + 1)) % len(other.ids)

@@ -19,7 +19,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, mask_of
@@ -30,7 +29,7 @@ from ..mesh.signed_graph import Links, signs_of
 from ..mesh.triangles import cut_into_ears
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import distinct_rows
-from ..parallel import in_chunks
+from ..parallel import PointTree, in_chunks
 from ..search.nearest_triangles import TriangleTree
 from .plane_fits import POINT_NEIGHBORS, point_spacing
 
@@ -89,7 +88,7 @@ def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
     is_open[edges.vertices[edges.face_counts == 1]] = True
     ends = np.flatnonzero(is_open)
     if len(ends):
-        near = scipy.spatial.cKDTree(points).query(points[ends], k=planes.neighbors.shape[1] + 1)[1][:, 1:]
+        near = PointTree(points).query(points[ends], k=planes.neighbors.shape[1] + 1)[1][:, 1:]
         proposals.append(proposed_triangles(planes, ends, near, is_open[near] | ~planes.opposed(ends, near)))
         faces = accepted_triangles(planes, proposals)
     candidates = np.concatenate([triangles for triangles, _ in proposals])
@@ -104,7 +103,7 @@ def islands(planes: TangentPlanes, faces: Ints) -> Bools:
     few = np.flatnonzero((np.bincount(part) < k)[part])
     result = np.zeros(n, dtype=bool)
     if len(few) and len(few) < n:
-        near = scipy.spatial.cKDTree(planes.points).query(planes.points[few], k=k + 1)[1][:, 1:]
+        near = PointTree(planes.points).query(planes.points[few], k=k + 1)[1][:, 1:]
         result[few] = planes.opposed(few, near).any(axis=1)
     return result
 
@@ -126,7 +125,7 @@ class TangentPlanes:
         """Fit planes to the neighbours on the same side, since the normals of scans often belong to another mesh."""
         k, many = (min(size, len(points) - 1) for size in (n_neighbors, 2 * n_neighbors))
         nearest = min(POINT_NEIGHBORS, many)
-        tree = scipy.spatial.cKDTree(points)
+        tree = PointTree(points)
 
         def fitted(ids: Ints) -> tuple[NDArray[Any], ...]:
             centers, own = points[ids], normals[ids]

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
 from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from ..mesh.unit_vectors import axes_across
-from ..parallel import in_chunks
+from ..parallel import PointTree, in_chunks
 
 POINT_NEIGHBORS = 8
 """Number of nearest points that count as the neighbours of a point: on a surface about six lie around it."""
@@ -55,7 +54,7 @@ class PlaneFits:
 
 def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     """Fit a plane near each of (n, 3) distinct points: to `n_neighbors` of noisy ones, or, if that is None, to few."""
-    tree = scipy.spatial.cKDTree(points)
+    tree = PointTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
     heights = NOISY_HEIGHTS if noisy else CLEAN_HEIGHTS
@@ -69,11 +68,11 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
     largest = (len(points) - 1) // 4
     if largest < CLEAN_NEIGHBORS:
         return []
-    tree = scipy.spatial.cKDTree(points)
+    tree = PointTree(points)
     tried = np.arange(0, len(points), -(-len(points) // TRIED_POINTS))
     if normals is not None:
         reach = float(np.median(tree.query(points[tried], k=CLEAN_NEIGHBORS + 1)[0][:, -1]))
-        tree = scipy.spatial.cKDTree(np.column_stack([points, reach * normals]))
+        tree = PointTree(np.column_stack([points, reach * normals]))
     deviations = planes_near(points, tree, tried, CLEAN_NEIGHBORS, NOISY_HEIGHTS, on_surface=True)[3]
     if np.median(deviations) < CLEAN_DEVIATION:
         return []
@@ -99,7 +98,7 @@ def point_spacing(distances: Floats, k: int) -> Floats:
 def share_of_two_sides(points: Floats, normals: Floats) -> float:
     """Share of points whose neighbours lie at two heights over a quadric, as on plates thinner than the spacing."""
     k = min(2 * CLEAN_NEIGHBORS, len(points) - 1)  # a quadric has twice as many coefficients as a plane
-    tree = scipy.spatial.cKDTree(points)
+    tree = PointTree(points)
 
     def two_sided(tried: Ints) -> tuple[Bools]:
         distances, near = tree.query(points[tried], k=k + 1)
@@ -121,7 +120,7 @@ def share_of_two_sides(points: Floats, normals: Floats) -> float:
 
 def planes_near(
     points: Floats,
-    tree: scipy.spatial.cKDTree,
+    tree: PointTree,
     chosen: Ints,
     n_neighbors: int,
     heights: tuple[float, ...],

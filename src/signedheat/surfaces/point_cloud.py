@@ -23,9 +23,11 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
 from ..exchange import Elements, Exchangeable
+from ..jobs import interruptible
 from ..mesh.signed_graph import Links, signs_of
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import same_rows
+from ..parallel import PointTree
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
 from ..words import counted, percent
 from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, opposed_normals
@@ -238,7 +240,7 @@ def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
     halfedges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, uses = np.unique(halfedges, axis=0, return_counts=True)
     twice = edges[uses > 1]
-    near = scipy.spatial.cKDTree(points).query(points[twice], k=min(1 + CLEAN_NEIGHBORS, len(points)))[1]
+    near = PointTree(points).query(points[twice], k=min(1 + CLEAN_NEIGHBORS, len(points)))[1]
     offsets = points[near] - points[twice][:, :, None]
     # a neighbour straight above or below lies on another side
     over = np.abs((offsets * normals[twice][:, :, None]).sum(axis=3)) > SAME_WAY * np.linalg.norm(offsets, axis=3)
@@ -305,7 +307,7 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
     They are kept if, all over the cloud, near points with opposite normals are each below the other, or each above.
     """
     k = min(POINT_NEIGHBORS, len(points) - 1)
-    distances, near = scipy.spatial.cKDTree(points).query(points, k=k + 1)
+    distances, near = PointTree(points).query(points, k=k + 1)
     flat = SAME_SIDE_HEIGHT * point_spacing(distances[:, k], k)
     offsets = points[near] - points[:, None]
     opposed = opposed_normals(points, given, flat, near)
@@ -359,13 +361,13 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
 
 def _lone(places: Floats, reaches: Floats) -> Bools:
     """(n,) whether a point is an outlier, much farther from its neighbours than these are from theirs."""
-    near = scipy.spatial.cKDTree(places).query(places, k=min(POINT_NEIGHBORS + 1, len(places)), workers=-1)[1]
+    near = PointTree(places).query(places, k=min(POINT_NEIGHBORS + 1, len(places)))[1]
     return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
 
 def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
     """(k,) signs that make the axes at `others` (k, 3) agree with the normals around them."""
-    distances, near = scipy.spatial.cKDTree(places).query(others, k=min(6, len(places)), workers=-1)
+    distances, near = PointTree(places).query(others, k=min(6, len(places)))
     distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
     weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
     cosines = np.einsum("nj,nkj->nk", axes, normals[near])
@@ -377,7 +379,7 @@ def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = Fals
     near = _neighbor_links(places, axes, 1.0 if noisy else WEAK_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:
-        tets = scipy.spatial.Delaunay(places + moves)
+        tets = interruptible(scipy.spatial.Delaunay, places + moves)
     except (scipy.spatial.QhullError, ValueError):
         return near, False
     if tets.simplices.max() >= len(places):  # Qhull gave up on precision, and its point at infinity is a corner
@@ -441,7 +443,7 @@ def neighbors_agree(points: Floats, normals: Floats) -> bool:
 def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
     """Link neighbours as if on a circle: reflection in the plane midway between them maps one axis to the other."""
     n, k = len(places), min(POINT_NEIGHBORS, len(places) - 1)
-    neighbors = scipy.spatial.cKDTree(places).query(places, k=k + 1, workers=-1)[1].reshape(n, -1)[:, 1:]
+    neighbors = PointTree(places).query(places, k=k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
     step = unit(places[heads] - places[tails])
     first, second = axes[tails], axes[heads]
@@ -451,12 +453,12 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
 
 def spread_out(points: Floats, radii: Floats) -> Ints:
     """Ids, ascending, of the points (n, d) that are kept: those not within the radius (n,) of any kept before them."""
-    tree = scipy.spatial.cKDTree(points)
+    tree = PointTree(points)
     kept = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), LISTED_AT_ONCE):
         part = np.arange(begin, min(begin + LISTED_AT_ONCE, len(points)))
         part = part[kept[part]]
-        near = tree.query_ball_point(points[part], radii[part], workers=-1)
+        near = tree.query_ball_point(points[part], radii[part])
         ends = np.cumsum([0, *map(len, near)])
         _keep_first(part, ends, np.concatenate([*map(np.asarray, near), np.zeros(0)]).astype(np.int64), kept)
     return np.flatnonzero(kept)

@@ -9,7 +9,6 @@ from numbers import Integral
 from typing import Any, TypeAlias, TypeGuard
 
 import numpy as np
-import scipy
 
 from ..arrays import Floats, Ints, mask_of
 from ..diagnostics import WithoutLength
@@ -31,6 +30,7 @@ from ..mesh.surface_points import (
     unique_points,
 )
 from ..mesh.triangles import Triangles
+from ..parallel import PointTree
 from .surface import Surface
 from .surface_curves import Curve, CurveOrPoints, ElementList, SurfacePoints
 from .triangle_mesh import TriangleMesh
@@ -257,7 +257,7 @@ def nearest_others(ends: Floats) -> Ints:
     """(2 k, 2) for each end of k pieces, its piece and the piece with the end nearest to it, perhaps the same one."""
     rows = np.arange(len(ends))
     piece = rows // 2
-    distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(3, len(ends)))
+    distances, near = PointTree(ends).query(ends, k=min(3, len(ends)))
     own = piece[near] == piece[:, None]
     own[:, 0] |= near[:, 0] == rows
     first = np.where(own, np.inf, distances).argmin(axis=1)

@@ -16,7 +16,6 @@ import math
 from typing import Any, cast
 
 import numpy as np
-import scipy
 
 from ..area_elements import area_elements, bounds_around
 from ..arrays import Bools, Floats, Ints
@@ -27,6 +26,7 @@ from ..grids.grid import room_around
 from ..kinds import Shape, ShapeLike
 from ..memory import refuse_beyond_memory
 from ..mesh.components import places_among
+from ..parallel import PointTree
 from ..surfaces.point_cloud import PointCloud
 from ..validation import finite_number, refuse_extreme
 from .tet_mesh import TetMesh
@@ -110,7 +110,7 @@ def tetrahedralize(
     else:
         _refuse_too_many(12 * volume_cells, 12 * volume_cells, size, 3)
     origin = lower - (counts * coarse - sides) / 2
-    samples = scipy.spatial.cKDTree(sample_points(own, spacing))
+    samples = PointTree(sample_points(own, spacing))
     corners, sizes = _octree(samples, origin, spacing, counts, depth, grading, size)
     points, tets = _join_leaves(corners, sizes, counts * 2 ** (depth + 1))
     return TetMesh(origin + points * (spacing / 2), tets)

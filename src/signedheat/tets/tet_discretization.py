@@ -19,6 +19,7 @@ from ..linear.incomplete_cholesky import IncompleteCholesky, from_first, outward
 from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
 from ..memory import refuse_beyond_memory
 from ..mesh.unit_vectors import unit
+from ..parallel import PointTree
 from .tet_clipping import SIGHT_OUTSIDE, Planes, visible
 from .tet_mesh import TetMesh
 from .tet_source import TetSource, tet_source
@@ -134,7 +135,7 @@ class TetDiscretization(DiffusesEach):
     def _straight(self, source: TetSource) -> Bools:
         """Return (m,) whether the source reaches each tet along a straight line."""
         planes, centers = self.planes, self.mesh.tet_barycenters
-        nearest = source.centers[scipy.spatial.cKDTree(source.centers).query(centers)[1]]
+        nearest = source.centers[PointTree(source.centers).query(centers)[1]]
         begins, ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
         return visible(planes, self.mesh.faces.neighbors, begins, ends, SIGHT_OUTSIDE * self.spacing)
 
