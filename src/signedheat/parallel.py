@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from .arrays import Floats
 from .errors import SignedHeatError
-from .jobs import awaited, interruptible, own_flag, run_limited, settle, start_thread, stop_if_abandoned
+from .jobs import awaited, briefly, interruptible, own_flag, run_limited, settle, start_thread, stop_if_abandoned
 from .packages import lazy_module
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
@@ -28,6 +28,8 @@ Result = TypeVar("Result")
 
 ROWS_PER_TASK = 1 << 13
 """Number of rows that a thread processes at a time."""
+BRIEF_ROWS = 1 << 8
+"""Number of rows up to which they are processed too soon for anybody to interrupt it."""
 CLUSTER_SECONDS = 30.0
 """Seconds to wait for a cluster to answer."""
 
@@ -46,6 +48,9 @@ def in_chunks(
 
     The result does not depend on the number of threads. Each thread needs additional memory for one chunk.
     """
+    if len(rows) <= BRIEF_ROWS:
+        with briefly():
+            return function(rows)
     if len(rows) <= ROWS_PER_TASK:
         return function(rows)
     first = function(rows[:ROWS_PER_TASK])

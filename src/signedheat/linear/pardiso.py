@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from threadpoolctl import threadpool_info
 
+from ..compiled import SHORT
 from ..errors import FactorizationError, UnsupportedTypeError
+from ..jobs import interruptible
 
 _ANALYZE, _FACTORIZE, _SOLVE, _RELEASE = 11, 22, 33, -1
 _POSITIVE_DEFINITE = {np.dtype(np.float64): 2, np.dtype(np.complex128): 4}
@@ -111,6 +113,7 @@ class _Call:
         index = np.int64 if wide else np.int32
         self._function = _library().pardiso_64 if wide else _library().pardiso
         self._handle = np.zeros(64, dtype=np.int64)
+        self._lock, self._is_released = threading.Lock(), False
         self.values = upper.data
         self.indptr, self.indices = upper.indptr.astype(index, copy=False), upper.indices.astype(index, copy=False)
         self._integer = ctypes.c_longlong if wide else ctypes.c_int
@@ -126,10 +129,35 @@ class _Call:
         self._threads = _library().MKL_Get_Max_Threads()
 
     def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
-        integer = self._integer
+        """Call PARDISO; after Ctrl-C it runs on alone, and memory that is released meanwhile is released at its end."""
+        if phase == _RELEASE:
+            self._is_released = True
+            self._release()
+        elif self._n <= SHORT:
+            self._alone(phase, rhs, solution)
+        else:
+            interruptible(self._alone, phase, rhs, solution)
+
+    def _alone(self, phase: int, rhs: NDArray[Any] | None, solution: NDArray[Any] | None) -> None:
+        """Call PARDISO while no other call does."""
+        with self._lock:
+            self._run(phase, rhs, solution)
+        if self._is_released:
+            self._release()
+
+    def _release(self) -> None:
+        """Release the memory, unless another call is running, which will do so."""
+        if self._lock.acquire(blocking=False):
+            try:
+                self._run(_RELEASE)
+            finally:
+                self._lock.release()
+
+    def _run(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
+        integer, values = self._integer, self.values  # which are others once nobody waits for this call
         status = integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
-        empty = np.zeros(1, dtype=self.values.dtype)
+        empty = np.zeros(1, dtype=values.dtype)
         waits = _wait_at_most(LONGEST_WAIT)
         # a two-level factor made on several threads gives wrong solutions on one, without an error, and vice versa
         others = _library().MKL_Set_Num_Threads_Local(self._threads)
@@ -140,7 +168,7 @@ class _Call:
             ctypes.byref(integer(self._kind)),
             ctypes.byref(integer(phase)),
             ctypes.byref(integer(self._n)),
-            *(_address(array) for array in (self.values, self.indptr, self.indices)),
+            *(_address(array) for array in (values, self.indptr, self.indices)),
             _address(self._order),
             ctypes.byref(n_columns),
             _address(self.parameters),

@@ -36,18 +36,10 @@ class SuperLUFactor:
         matrix = whole(upper)[self._order][:, self._order]
         with one_blas_thread():  # its dense blocks are tiny: threads cost ten times what they gain
             try:
-                factor = interruptible(
-                    splu,
-                    sparse.csc_matrix(matrix),
-                    permc_spec="NATURAL",
-                    diag_pivot_thresh=0.0,
-                    options={"SymmetricMode": True},
-                )
+                self._lower, self._pivots, rows = interruptible(_factored, sparse.csc_matrix(matrix))
             except RuntimeError as error:
                 raise FactorizationError(f"SuperLU failed on {self.n} unknowns: {error}", element="matrix") from error
-        self._lower: sparse.csc_matrix = factor.L  # each column begins with its diagonal, which is one
-        self._pivots: Floats = factor.U.diagonal().real
-        if not (self._pivots > 0).all() or (factor.perm_r != np.arange(self.n)).any():
+        if not (self._pivots > 0).all() or (rows != np.arange(self.n)).any():
             raise FactorizationError(
                 f"SuperLU failed on {self.n} unknowns: the matrix is not positive definite", element="matrix"
             )
@@ -68,6 +60,15 @@ class SuperLUFactor:
     def nonzeros(self) -> int:
         """Entries stored in the factor."""
         return int(self._lower.nnz)
+
+
+def _factored(matrix: sparse.csc_matrix) -> tuple[sparse.csc_matrix, Floats, NDArray[np.integer]]:
+    """Return the lower factor, whose columns begin with their diagonal, which is one; pivots; and the order of rows.
+
+    SuperLU's own copy of the factor ends here: it can only be freed on the thread that made it.
+    """
+    factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return factor.L, factor.U.diagonal().real, factor.perm_r.copy()  # which would keep it alive
 
 
 @compiled
