@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from .arrays import Bools, Floats
-from .errors import GeometryError, SignedHeatError, SourceError, UnsupportedTypeError
+from .errors import GeometryError, SourceError, UnsupportedTypeError
 from .grids.grid import Grid
 from .packages import lazy_module
 from .validation import finite_number
@@ -59,11 +59,7 @@ Solid = TypeVar("Solid", bound=SolidField)
 
 def _finite(number: Number) -> float:
     """Return a number as a float; refuse NaN and infinity, which would leave no distance."""
-    if not np.isfinite(number):
-        raise SignedHeatError(
-            f"a field with {number} is no field of distances", remedy="use a finite number", element="number"
-        )
-    return float(number)
+    return finite_number(number, "a number that a field is combined with")
 
 
 class Arithmetic:
@@ -109,7 +105,7 @@ class Arithmetic:
         return self._mapped(lambda phi: phi + level) if level else self._scaled(1.0)
 
     def __sub__(self: AnyField, level: Number) -> AnyField:
-        return Arithmetic.__add__(self, -float(level)) if isinstance(level, NUMBER_TYPES) else NotImplemented
+        return Arithmetic.__add__(self, -_finite(level)) if isinstance(level, NUMBER_TYPES) else NotImplemented
 
     def __rsub__(self: AnyField, level: Number) -> AnyField:
         if not isinstance(level, NUMBER_TYPES):

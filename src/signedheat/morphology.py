@@ -50,7 +50,7 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
-from .validation import array_of, finite_number, flag, numbers, positive_number, refuse_beside
+from .validation import array_of, chosen, finite_number, flag, numbers, positive_number, refuse_beside
 from .words import counted
 
 __all__ = [
@@ -58,7 +58,9 @@ __all__ = [
     "smooth_union", "thicken",
 ]  # fmt: skip
 
-MITRE_LIMITS = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
+Corners: TypeAlias = Literal["round", "mitre", "sharp"]
+Side: TypeAlias = Literal["outside", "inside", "both"]
+MITRE_LIMITS: dict[Corners, float] = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
 """Largest length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between
 faces less than 60° apart are cut off; with 10, those of less than 12°."""
 DRAIN_SIDES = 64
@@ -303,7 +305,7 @@ def offset(
     shape: Shapes,
     distance: float | ArrayLike | Reach,
     *,
-    corners: Literal["round", "mitre", "sharp"] = "round",
+    corners: Corners = "round",
     resolution: int = RESOLUTION,
     spacing: ArrayLike | None = None,
     progress: Progress | None = None,
@@ -354,8 +356,7 @@ def offset(
     >>> grown.bounds[:, 2].round(2).tolist()
     [-1.1, 1.3]
     """
-    if corners not in MITRE_LIMITS:
-        raise SignedHeatError(f"corners are {', '.join(MITRE_LIMITS)}, not {corners!r}", element="corners")
+    chosen(corners, Corners, "corners")
     solid = complete(shape)
     reach: float | Reach
     if callable(distance):
@@ -478,7 +479,7 @@ def thicken(
     below: float | None = None,
     domain: Grid | None = None,
     *,
-    side: Literal["outside", "inside", "both"] = "both",
+    side: Side = "both",
     faces: ArrayLike | None = None,
     resolution: int | None = None,
 ) -> TriangleMesh:
@@ -528,10 +529,9 @@ def thicken(
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.1]]
     """
     above = finite_number(above, "the reach above", least=0)
-    if side not in ("outside", "inside", "both") or (below is not None and side != "both"):
-        raise SignedHeatError(
-            "side must be outside, inside or both, and with `below` it must be both", element="side", remedy="name one"
-        )
+    chosen(side, Side, "side")
+    if below is not None and side != "both":
+        raise SignedHeatError("side must be both if `below` is given", element="side", remedy="leave out one of them")
     if below is None:
         above, below = above if side != "inside" else 0.0, above if side != "outside" else 0.0
     below = finite_number(below, "the reach below", least=0)

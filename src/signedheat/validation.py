@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from numbers import Integral, Real
 from typing import Any, TypeVar, get_args
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
-from .errors import GeometryError, SignedHeatError, UnsupportedTypeError
+from .errors import FileFormatError, GeometryError, SignedHeatError, UnsupportedTypeError
 from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -213,7 +214,7 @@ def flag(value: object, name: str) -> bool:
 def chosen(value: object, choices: object, name: str) -> None:
     """Refuse a value that is not one of the words of the ``Literal`` `choices`."""
     allowed = get_args(choices)
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         listed = " or ".join(f'"{choice}"' for choice in allowed)
         raise SignedHeatError(f"{name} must be {listed}, not {value!r:.50}", element=name)
 
@@ -304,3 +305,13 @@ def used_bounds(points: Floats, ids: Ints) -> Floats:
     used = mask_of(len(points), ids.ravel())
     columns = (points if used.all() else points[used]).T
     return np.array([[column.min() for column in columns], [column.max() for column in columns]])
+
+
+def refuse_deleted_folder(path: str | os.PathLike[str]) -> None:
+    """Raise `FileFormatError` if a path is relative to a working folder that has been deleted."""
+    try:
+        if not os.path.isabs(path):
+            os.getcwd()
+    except FileNotFoundError:
+        cause = "the folder that it is in, the current one, has been deleted"
+        raise FileFormatError(cause, remedy="change to another folder", path=path) from None

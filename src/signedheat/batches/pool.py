@@ -29,12 +29,13 @@ from signal import SIG_IGN, SIGINT, Signals, signal
 from types import FunctionType
 from typing import Any
 
+from ..calls import refuse_uncallable
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
 from ..jobs import MOST_THREADS, Announcement, Progress, command_for, logger
 from ..packages import require
 from ..parallel import connected, n_threads
-from ..validation import positive_number, whole_number
+from ..validation import positive_number, refuse_deleted_folder, whole_number
 from .inputs import Input, expand, named_path
 from .job import Job
 from .manifest import Manifest, Outcome, State, source_of
@@ -363,10 +364,12 @@ def run(
     ...     batches.run(folder, f"{folder}/out", batches.Job(volume=".npz", resolution=16), workers=1)
     Batch(3 of 3 shapes done, 0 of them before)
     """
+    refuse_uncallable(progress)
     if scheduler is not None:
         require("distributed", "clusters")
     _refuse_odd(workers, threads, time_limit)
     target = named_path(folder)
+    refuse_deleted_folder(target)
     if os.path.lexists(target) and not target.is_dir():
         raise FileFormatError("this is not a folder", remedy="choose another one", path=target)
     shapes = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)

@@ -21,6 +21,7 @@ from typing import BinaryIO, TypeVar
 import numpy as np
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, UnsupportedTypeError
+from ..validation import refuse_deleted_folder
 from .budgets import account, charge
 
 PathLike = str | os.PathLike[str]
@@ -141,6 +142,7 @@ def _opened(path: PathLike) -> Iterator[tuple[BinaryIO, int]]:
     except SignedHeatError:
         raise
     except FileNotFoundError:
+        refuse_deleted_folder(path)
         raise FileFormatError("there is no such file", remedy="check the name", path=path) from None
     except IsADirectoryError:
         raise FileFormatError("this is a folder", remedy="name a file in it", path=path) from None
@@ -252,6 +254,7 @@ def writing(path: PathLike) -> Iterator[None]:
     try:
         yield
     except OSError as error:
+        refuse_deleted_folder(path)
         reason = error.strerror or str(error)
         raise FileFormatError(
             f"cannot be written ({reason})",

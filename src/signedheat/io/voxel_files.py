@@ -89,6 +89,8 @@ class LabelImage(Represented, Frozen):
             numbers(self.axes, "axes"),
             numbers(self.origin, "origin"),
         )
+        if not isinstance(self.space, str | None):
+            raise GeometryError(f"space is a name or None, not a {type(self.space).__name__}", element="space")
         if labels.ndim != 3 or labels.dtype.kind not in "biuf" or axes.shape != (3, 3) or origin.shape != (3,):
             raise GeometryError(
                 f"labels, axes and origin of an image in space have the shapes (nx, ny, nz), (3, 3) and (3,), not "

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints, short
-from ..calls import public_call
+from ..calls import public_call, refuse_uncallable
 from ..diagnostics import CompletedArea, Diagnostics, Note
 from ..errors import InexactWarning, SourceError, warn_user
 from ..exchange import Displayed
@@ -324,6 +324,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> field.values.shape, field([[0.0, 0.0, 0.9]]).round(2)
         ((32, 32, 32), array([-0.1]))
         """
+        refuse_uncallable(progress)
         if grid is None:
             where = Grid.around(self.bounds, RESOLUTION if resolution is None else resolution, padding, spacing)
         else:
@@ -411,6 +412,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> bool(np.abs(np.linalg.norm(contour.vertices, axis=1) - 0.8).max() < 0.02)
         True
         """
+        refuse_uncallable(progress)
         smooth = not flag(sharp, "sharp")
         if tolerance is not None:
             within = positive_number(tolerance, "tolerance")
@@ -434,7 +436,7 @@ class Solid(Displayed, Represented, Frozen):
         self,
         distance: float | ArrayLike | Reach,
         *,
-        corners: Literal["round", "mitre", "sharp"] = "round",
+        corners: morphology.Corners = "round",
         resolution: int = 128,
         spacing: ArrayLike | None = None,
         progress: Progress | None = None,

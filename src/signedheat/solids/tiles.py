@@ -39,7 +39,7 @@ from ..packages import lazy_module
 from ..parallel import connected, in_threads, n_threads
 from ..search.face_tree import FaceTree, feet_on
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import positive_number
+from ..validation import positive_number, refuse_deleted_folder
 from .winding import Windings
 
 TILE = 8
@@ -244,6 +244,7 @@ def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) 
 def blocks_that_fit(store: str | PathLike[str] | None) -> int:
     """Count the blocks that fit in memory, or on the disk of a store."""
     if store is not None:
+        refuse_deleted_folder(store)
         folder = Path(store).absolute()
         existing = next(place for place in (folder, *folder.parents) if place.exists())
         return max(blocks_held(folder), int(shutil.disk_usage(existing).free / (BLOCK_NODES * BYTES_IN_BAND)))

@@ -85,7 +85,7 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
 
 def checked_intrinsic(intrinsic: bool | Literal["auto"]) -> bool | Literal["auto"]:
     """Return the option `intrinsic` of `SignedHeatSolver`; refuse what it cannot be."""
-    if not (isinstance(intrinsic, bool) or intrinsic == "auto"):
+    if not (isinstance(intrinsic, bool) or (isinstance(intrinsic, str) and intrinsic == "auto")):
         raise SignedHeatError(f"intrinsic must be 'auto', True or False, not {intrinsic!r:.40}", element="intrinsic")
     return intrinsic
 
