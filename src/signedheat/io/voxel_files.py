@@ -30,7 +30,7 @@ Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 
 VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
-BYTES_PER_VOXEL = 12
+BYTES_PER_READ_VOXEL = 12
 """Memory for a voxel while the boundary of a volume is found: measured."""
 SPACES = {
     "right-anterior-superior": (1, 1, 1),
@@ -362,7 +362,7 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     """
     with reading(path):
         image = read_image(path, VOLUME_FORMATS, "a volume")
-        charge(bytes=BYTES_PER_VOXEL * image.values.size)
+        charge(bytes=BYTES_PER_READ_VOXEL * image.values.size)
         if image.values.ndim != 3:
             raise FileFormatError(f"a volume has 3 axes, and the image has {image.values.ndim}")
         inside = image.values if level is None else image.values > level
