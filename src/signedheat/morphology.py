@@ -50,7 +50,7 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
-from .validation import array_of, chosen, finite_number, flag, numbers, positive_number, refuse_beside
+from .validation import array_of, callback, chosen, finite_number, flag, numbers, positive_number, refuse_beside
 from .words import counted
 
 __all__ = [
@@ -446,6 +446,7 @@ def shell(
     hole = None if drain is None else positive_number(drain, "drain")
     grid = _grid(_given_or_room(domain, shape, max(abs(inner), abs(outer)), resolution))
     _refuse_thin(grid, outer - inner)
+    callback(measure, "measure(shape, domain)")
     if keep_outside and measure is None:
         solid: object = complete(shape)
     else:
@@ -656,6 +657,7 @@ def _offsets(
 ) -> Boundary:
     """Offset a shape once for each sign, outward for 1 and inward for −1; compute the distance again each time."""
     distance = finite_number(distance, "the distance", least=0)
+    callback(measure, "measure(shape, domain)")
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:
         field = (measure or signed_distance)(shape, domain)

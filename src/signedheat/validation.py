@@ -211,6 +211,20 @@ def flag(value: object, name: str) -> bool:
     return bool(value)
 
 
+def callback(function: object, call: str) -> None:
+    """Refuse what cannot be called as `call` says, and is not None."""
+    if function is not None and not callable(function):
+        name = call.partition("(")[0]
+        cause = f"{name} is a {type(function).__name__}"
+        raise UnsupportedTypeError(cause, remedy=f"pass a function that is called as {call}", element=name)
+
+
+def instance(value: object, kind: type, name: str) -> None:
+    """Refuse what is no object of a class, and not None."""
+    if value is not None and not isinstance(value, kind):
+        raise UnsupportedTypeError(f"{name} is a {type(value).__name__}, not a {kind.__name__}", element=name)
+
+
 def chosen(value: object, choices: object, name: str) -> None:
     """Refuse a value that is not one of the words of the ``Literal`` `choices`."""
     allowed = get_args(choices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import numpy as np
@@ -188,8 +189,10 @@ def check_arguments(given: Subject) -> str:
         (sh.complete, {"shape": ball}),
     ]
     call, arguments = one_of(random, right)
-    name = one_of(random, arguments)
-    value = arguments[name]
+    parameters = inspect.signature(call).parameters.values()
+    others = [each.name for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
+    name = one_of(random, list(dict.fromkeys([*arguments, *others])))
+    value = arguments.get(name)
     if isinstance(value, np.ndarray) and chance(random, 0.4):
         arguments[name] = laid_out(random, value)
         announced(lambda: call(**arguments))

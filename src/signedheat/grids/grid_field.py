@@ -24,7 +24,7 @@ from ..mesh.triangles import flipped_along_creases
 from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import contiguous, finite_number, query_points, shaped
+from ..validation import array_of, contiguous, finite_number, instance, query_points, shaped
 from ..words import counted
 from .blocks import BLOCK, Blocks, BlockValues
 from .grid import Dimension, Grid
@@ -101,6 +101,9 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
     def __post_init__(self) -> None:
         if not isinstance(self.grid, Grid):
             raise UnsupportedTypeError(f"{self.grid!r:.80} is not a Grid", element="grid")
+        instance(self.diagnostics, Diagnostics, "diagnostics")
+        instance(self.blocks, Blocks, "blocks")
+        instance(self.coarse, GridField, "coarse")
         if self.blocks is not None:
             self._check_blocks(self.blocks)
             return
@@ -111,7 +114,10 @@ class GridField(Displayed, Combinable, Frozen, Generic[Dimension]):
             )
         object.__setattr__(self, "values", values)
         if self.confidence is not None:
-            confidence = np.asarray(self.confidence, dtype=np.float32)
+            confidence = array_of(self.confidence, "confidence")
+            if confidence.dtype.kind not in "biuf":
+                raise GeometryError(f"confidence is an array of {confidence.dtype}", element="confidence")
+            confidence = confidence.astype(np.float32, copy=False)
             if confidence.shape != values.shape:
                 raise GeometryError(
                     f"confidence has shape {confidence.shape}, and the values {values.shape}", element="confidence"
