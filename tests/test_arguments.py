@@ -13,7 +13,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import batches, samples
-from signedheat.errors import GeometryError, SignedHeatError, UnsupportedTypeError
+from signedheat.errors import GeometryError, SignedHeatError
 
 BALL = samples.sphere(1)
 GRID = sh.Grid((-1.5,) * 3, 0.5, (7, 7, 7))
@@ -38,7 +38,7 @@ WORDS = {
     "side": [partial(sh.morphology.thicken, BALL, 0.1)],
     "fill": [partial(sh.signed_distance, LINE, PLANE)],
     "intrinsic": [partial(sh.SignedHeatSolver, BALL), partial(sh.signed_distance, CURVE, BALL)],
-    "layout": [partial(sh.sample(BALL, 10).save, "a.npz")],
+    "layout": [partial(sh.sample_distances(BALL, 10).save, "a.npz")],
 }
 """Calls that take one of some words."""
 
@@ -77,7 +77,7 @@ def test_progress_is_called_or_refused(name):
     REPORTING[name](progress=lambda fraction, step: seen.append(fraction))
     assert seen and min(seen) >= 0.0 and seen[-1] == max(seen) == 1.0, seen
     for odd in ("x", 3, [print], np.zeros(3), True):
-        with refused(UnsupportedTypeError, element="progress"):
+        with refused(SignedHeatError, element="progress"):
             REPORTING[name](progress=odd)
 
 
@@ -121,7 +121,7 @@ def test_spaces_of_images_are_names(space):
 
 
 def test_batches_refuse_what_cannot_be_called(tmp_path):
-    with refused(UnsupportedTypeError, element="progress"):
+    with refused(SignedHeatError, element="progress"):
         batches.run(tmp_path, tmp_path / "out", batches.Job(volume=".npz", resolution=8), progress="x")
 
 
@@ -143,7 +143,7 @@ for call in (
 ):
     try:
         call()
-    except sh.FileFormatError as error:
+    except sh.errors.FileFormatError as error:
         print("deleted" in error.cause and error.path is not None)
 """
 

@@ -22,7 +22,7 @@ def shortened(text: str) -> str:
 
     Examples
     --------
-    >>> len(shortened("no such\nname: " + 10_000 * "a"))
+    >>> len(shortened("no such\\nname: " + 10_000 * "a"))
     600
     """
     line = " ".join(text[: 2 * LONGEST_TEXT].split())

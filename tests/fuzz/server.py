@@ -1,8 +1,9 @@
-"""A server's loop: ``python -m fuzz.server SECONDS``, in the folder tests, reads mixed uploads for so much processor time.
+"""A server's loop: ``python -m fuzz.server SECONDS``, in the folder tests, reads mixed uploads for so long.
 
-Each upload is a right file, one that is damaged, or one that expands. It is read within a budget and, where it is small,
-completed and asked for distances. Told are the outcomes, the longest time of an upload, and by how much memory grew
-after the first tenth. The status is 1 if anything but an answer or a refusal came out.
+Seconds are those of a processor. Each upload is a right file, one that is damaged, or one that expands. It is read
+within a budget and, where it is small, completed and asked for distances. Told are the outcomes, the longest time of an
+upload, and by how much memory grew after the first tenth. The status is 1 if anything but an answer or a refusal came
+out.
 """
 
 from __future__ import annotations

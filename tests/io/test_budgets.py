@@ -95,9 +95,9 @@ def test_packed_values_are_counted_with_their_copies(tmp_path, ending, monkeypat
     size = n**3 * (8 if ending == "npz" else 1)
     monkeypatch.setattr(budgets, "available_memory", lambda: int(0.99 * size))
     with refused(MemoryLimitError, file=path.name):
-        sh.load_field(path)
+        sh.io.read_field(path)
     monkeypatch.setattr(budgets, "available_memory", lambda: 7 * size)
-    sh.load_field(path)
+    sh.io.read_field(path)
 
 
 @pytest.mark.parametrize(
