@@ -58,7 +58,7 @@ REPORTING = {
     "curves": partial(sh.signed_distance, CURVE, BALL),
     "plane": partial(sh.signed_distance, LINE, PLANE),
     "complete": partial(sh.complete, BALL),
-    "piecewise": partial(sh.piecewise_distance, BALL, CURVE),
+    "piecewise": partial(sh.piecewise_distance, CURVE, BALL),
     **{f"sharpen {name}": partial(sh.sharpen, field) for name, field in FIELDS.items() if name != "plane"},
     "solver": lambda progress: sh.SignedHeatSolver(BALL, progress=progress).distance(CURVE),
     "deviation": partial(sh.deviation, BALL, BALL),

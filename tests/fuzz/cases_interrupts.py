@@ -51,7 +51,7 @@ LONG_CALLS: dict[str, tuple[float, Callable[[], Any]]] = {
     "method": (2.0, lambda: sh.SignedHeatSolver(sh.Grid((-1.2,) * 3, 2.4 / 79, (80,) * 3)).distance(_broken(4))),
     "surface": (3.0, lambda: sh.signed_distance(_path(), _ball(6))),
     "factor": (2.0, lambda: sh.SignedHeatSolver(_ball(6)).distance(_path())),
-    "close": (2.0, lambda: sh.close_curves(_ball(6), _path())),
+    "close": (2.0, lambda: sh.close_curves(_path(), _ball(6))),
     "paths": (1.0, lambda: [_path() for _ in range(200)]),
     "points": (3.0, lambda: sh.complete(_scan())),
     "offset": (3.0, lambda: sh.offset(_broken(4), 0.05)),
