@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from .calls import is_pair, like_array, public_call
 from .errors import SourceError, UnsupportedTypeError
 from .exchange import ACCEPTED_SHAPES, ELEMENTS_OF, Elements
+from .geometries import geometry_of, polylines_of
 from .surfaces.digital_surface import DigitalSurface
 from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
@@ -185,12 +186,21 @@ def refuse_arrays(things: Sequence[object]) -> None:
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
-    """Return one argument or several as a list, with every shape of another package converted (see `as_shape`)."""
+    """Return one argument or several as a list, with every shape of another package converted (see `as_shape`).
+
+    Geometries of shapely, GeoPandas and GeoJSON become polylines.
+    """
     several = isinstance(things, Sequence) and not isinstance(things, str)
-    if is_pair(things) or package_of(things) is not None:
+    if is_pair(things) or package_of(things) is not None or geometry_of(things) is not None:
         several = False
-    listed = list(cast("Sequence[Thing]", things)) if several else [things]
-    return [converted(cast("Thing", thing)) for thing in listed]
+    shapes: list[Thing] = []
+    for thing in list(cast("Sequence[Thing]", things)) if several else [things]:
+        geometry = geometry_of(thing)
+        if geometry is None:
+            shapes.append(converted(cast("Thing", thing)))
+        else:
+            shapes += cast("list[Thing]", polylines_of(geometry))
+    return shapes
 
 
 def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = MappingProxyType({})) -> Elements:

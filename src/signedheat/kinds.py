@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias, TypeVar
 
 from .foreign import ForeignShape
 from .foreign import Shape as Shape
+from .geometries import HasGeoInterface
 from .grids.grid import Grid
 from .grids.polyline import Polyline
 from .surfaces.digital_surface import DigitalSurface
@@ -29,9 +30,11 @@ ShapeLike: TypeAlias = Shape | ForeignShape
 """Shapes, including objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
 Shapes: TypeAlias = ShapeLike | Sequence[ShapeLike]
 """One shape in space or several."""
-Polylines: TypeAlias = Polyline | Sequence[Polyline]
+PlanarGeometry: TypeAlias = HasGeoInterface | Mapping[str, object]
+"""Geometries of shapely and GeoPandas, and GeoJSON."""
+Polylines: TypeAlias = Polyline | PlanarGeometry | Sequence[Polyline | PlanarGeometry]
 """One line in the plane or several."""
-SpaceSource: TypeAlias = ShapeLike | Polyline
+SpaceSource: TypeAlias = ShapeLike | Polyline | PlanarGeometry
 """Sources of distance on grids."""
 SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]
 """One source of distance on grids or several."""

@@ -7,6 +7,7 @@ from .curves.piecewise_field import PiecewiseField
 from .distances import signed_distance
 from .errors import SignedHeatError
 from .foreign import as_shape
+from .geometries import to_shapely
 from .grids.grid import Grid
 from .grids.grid_field import GridField
 from .grids.polyline import Polyline
@@ -45,7 +46,7 @@ __all__ = [
     "TetMesh", "TriangleMesh", "VertexField", "as_shape", "close_curves", "common_subdivision", "complete",
     "contour", "deviation", "fill_holes", "intrinsic_delaunay", "offset", "orient", "orientation",
     "piecewise_distance", "read", "read_field", "redistance", "sample_distances", "save", "sharpen",
-    "signed_distance", "tetrahedralize", "transform", "wall_thickness",
+    "signed_distance", "tetrahedralize", "to_shapely", "transform", "wall_thickness",
 ]  # fmt: skip
 
 for _module in MODULES:  # completion in notebooks offers public names only

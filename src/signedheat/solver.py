@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
-from typing import Any, Generic, Literal, NamedTuple, TypeVar, overload
+from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, overload
 
 from .arrays import Frozen, Ints
 from .calls import public_call, refuse_pair_apart, refuse_uncallable
@@ -24,6 +24,7 @@ from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .surfaces.intrinsic_discretization import Retriangulated, checked_intrinsic, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh
+from .surfaces.repaired_mesh import RepairedMesh
 from .surfaces.source_segments import given_curves, numbers_kept, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
@@ -193,7 +194,16 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         """
         return warned(self._distance(sources, constraint))
 
+    @cached_property
+    def _repaired(self) -> tuple[RepairedMesh, SignedHeatSolver[Any]] | None:
+        """The domain without copies of faces, and the solver on it; None if there are no copies."""
+        repaired = RepairedMesh.of(self.domain, agree=False)
+        return None if repaired is None else (repaired, replace(self, domain=repaired.mesh))
+
     def _distance(self, sources: Sources, constraint: Constraint | None) -> Field:
+        if self._repaired is not None:
+            repaired, solver = self._repaired
+            return repaired.on_given(cast("VertexField", solver._distance(repaired.on_it(sources), constraint)))
         constraint = checked(constraint)
         stopwatch = Stopwatch(self.progress, steps=5)
         with stopwatch("prepare"):
@@ -271,6 +281,9 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             raise SourceError(
                 f"distance is measured to each source of a list, and a {kind} is none", remedy="call distance instead"
             ) from None
+        if self._repaired is not None:
+            repaired, solver = self._repaired
+            return [repaired.on_given(f) for f in solver.distance_many([repaired.on_it(s) for s in listed], constraint)]
         report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
         fields: list[Field] = []
         for begin in range(0, len(listed), SOURCES_AT_ONCE):

@@ -98,12 +98,13 @@ def test_no_piece_is_left_out_where_half_of_the_curve_is_gone(seed):
     assert taken(sh.signed_distance(pieces, mesh)) == ([], [])
 
 
-def test_lines_from_rim_to_rim_are_complete(mesh):
-    """Parallel lines that face the same way contradict each other between them; they are taken as they are."""
+def test_lines_from_rim_to_rim_are_turned_like_others(mesh):
+    """Parallel lines that face the same way contradict each other between them; those that do not are as given."""
     lines = [mesh.level_set(mesh.vertices[:, 0] - x)[0] for x in (-0.31, 0.32)]
     found = sh.orientation(lines, mesh)
-    assert not found.turned.any()
-    assert (found.agreement == 1).all()
+    assert found.turned.sum() == 1
+    assert found.agreement.min() > 0.999
+    assert not sh.orientation([lines[0], lines[1].reversed()], mesh).turned.any()
 
 
 def tube(n_around: int = 48, n_along: int = 49, length: float = 4.0) -> sh.TriangleMesh:
@@ -145,9 +146,3 @@ def test_orienting_keeps_rings_that_face_each_other_too():
     given = [pieces[0], pieces[1].reversed(), *pieces[2:]]
     assert sh.orientation(pieces, mesh).turned.tolist() == [False] * 6
     assert sh.orientation(given, mesh).turned.tolist() == [False, True, False, False, False, False]
-
-
-def test_rings_nearer_than_their_gaps_are_long():
-    """Three pieces each, with gaps nearly three times as long as the rings are apart: taken as they are drawn."""
-    mesh = tube()
-    assert not sh.orientation(rings(mesh, 0.3, 3, 0.4), mesh).turned.any()

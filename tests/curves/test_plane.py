@@ -1,5 +1,7 @@
 """Distance to drawings in the plane: exact to their lines, completed where lines are missing."""
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from shapes import strokes
 from shapes.bodies import distance_to_box
 from signedheat import samples
 from signedheat.curves.curve_distance import CurvesTaken
-from signedheat.curves.drawings import OutlinesFilled
+from signedheat.curves.outlines import OutlinesFilled
 from signedheat.errors import InexactWarning
 
 SQUARE = np.array([[-1.0, -1], [-1, 1], [1, 1], [1, -1]])
@@ -122,12 +124,80 @@ def test_a_turned_and_scaled_drawing_has_the_same_distances():
     assert np.abs(other(1e3 * points @ turn) / 1e3 - one(points)).max() < 0.03
 
 
+@pytest.mark.filterwarnings("ignore:.*of the length of the curves was left out")
 @pytest.mark.parametrize("damage", ["pieces_turned", "twice_turned", "bits", "long_strays", "scribbles"])
 def test_strokes_are_turned_or_left_out(damage):
     drawing, lines = strokes.drawing_in_plane(np.random.default_rng(4), damage)
     places = drawing.mesh.vertices[:, :2]
     field = sh.signed_distance(lines, sh.Grid.around([places.min(axis=0), places.max(axis=0)], 97, padding=0.0))
-    assert strokes.wrong_share(drawing, field(places)) < 0.03
+    outside = drawing.sides[places.sum(axis=1).argmax()]  # what is bounded is inside, whichever way it runs
+    assert strokes.wrong_share(drawing, outside * field(places)) < 0.03
+
+
+def rectangle(begin, gone, way):
+    """10 by 6, without a share of its length, beginning at another, either way round; as an open line."""
+    corners = np.array([[0, 0], [10, 0], [10, 6], [0, 6], [0, 0]])
+    at = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))]) / 32
+    share = np.unique(
+        [begin, *at[(at > begin) & (at < begin + 1 - gone)], *(1 + at[1 + at < begin + 1 - gone]), begin + 1 - gone]
+    )
+    points = np.stack([np.interp(share % 1, at, corners[:, axis]) for axis in (0, 1)], axis=1)
+    return sh.Polyline(points[::way])
+
+
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("begin", [0.0, 0.45])
+@pytest.mark.parametrize("gone", [0.0, 1e-14, 1e-6, 0.01, 0.2, 0.3])
+def test_a_ring_is_a_ring_whatever_it_misses(gone, begin, way):
+    line = rectangle(begin, gone, way)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InexactWarning if gone > 0.2 else ())
+        field = sh.signed_distance(line, resolution=64, padding=3.0)
+    depth = 3.0 if gone < 0.2 else 2.5
+    assert field([5.0, 3.0]) < -depth + 1e-6 and (field([[-2.5, -2.5], [12.5, 8.5]]) > 2.5).all()
+    [outline] = field.offset(1.0)
+    assert abs(abs(outline.signed_area) - (12 * 8 - 4 + np.pi)) < (0.2 if gone < 0.1 else 16)
+    if gone < 1e-9:
+        np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (0, 0), (10, 6)), atol=1e-9)
+
+
+@pytest.mark.parametrize("ways", [(1, 1, 1, 1), (1, -1, 1, -1), (-1, -1, -1, 1)])
+def test_lines_that_close_together_are_filled(ways):
+    """The sides of a square as a drawing program writes them, in any order and either way, also given twice."""
+    lines = [side if way > 0 else side.reversed() for side, way in zip(sides(0.0), ways, strict=True)]
+    for given in (lines, lines[::-1], [*lines, lines[2], lines[0].reversed()]):
+        field = sh.signed_distance(given, resolution=24)
+        np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (-1, -1), (1, 1)), atol=1e-12)
+        assert field.diagnostics.note(OutlinesFilled).outlines == 1
+
+
+def test_lines_drawn_there_and_back_are_no_outline():
+    line = np.array([[0.0, 0.0], [1.0, 0.2], [2.0, 0.0]])
+    one = sh.signed_distance(sh.Polyline(line), resolution=24)
+    twice = sh.signed_distance([sh.Polyline(line), sh.Polyline(line + 1e-13)], one.grid)
+    np.testing.assert_allclose(twice.values, one.values, atol=1e-7)  # the gap times the slope of heat beyond the ends
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_direction_decides_where_nothing_is_bounded(way):
+    arc = np.linspace(0, 0.6 * np.pi, 30)
+    for line in ([[0.0, 0.0], [2.0, 0.1]], np.stack([np.cos(arc), np.sin(arc)], axis=1)):
+        points = np.asarray(line)[::way]
+        field = sh.signed_distance(sh.Polyline(points), resolution=32)
+        middle = points[len(points) // 2 - 1 : len(points) // 2 + 1]
+        left = np.array([[0, -1], [1, 0]]) @ (middle[1] - middle[0])
+        assert field(middle.mean(axis=0) + 0.05 * left) > 0 > field(middle.mean(axis=0) - 0.05 * left)
+
+
+@pytest.mark.parametrize("gap", [1e-10, 1e-5, 0.05])
+@pytest.mark.parametrize("way", [1, -1])
+def test_outlines_with_and_without_gaps_are_filled_alike(gap, way):
+    square = sh.Polyline(SQUARE, closed=True)
+    broken = sh.Polyline(np.vstack([SQUARE, [[gap - 1, -1]]])[::way] + np.array([4, 0]))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InexactWarning)  # two alike that run against each other
+        field = sh.signed_distance([square, broken], resolution=64)
+    np.testing.assert_allclose(field([[0, 0], [4, 0], [2, 0]]), [-1, -1, 1], atol=1e-9)
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.17, 0.87, 2.27])

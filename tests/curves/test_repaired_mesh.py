@@ -9,10 +9,10 @@ from scipy.spatial import cKDTree
 import signedheat as sh
 from shapes.surface_cases import band
 from shapes.triangulated import klein_bottle
-from signedheat.curves.curve_distance import MeshRepaired
 from signedheat.diagnostics import VerticesJoined
 from signedheat.errors import InexactWarning, UnreachedWarning
 from signedheat.samples import sphere, union
+from signedheat.surfaces.repaired_mesh import MeshRepaired
 
 BALL = sphere(3)
 ANGLES = np.linspace(0, 2 * np.pi, 121)
@@ -223,3 +223,28 @@ def test_polygons_have_seams():
     whole = sh.PolygonMesh(points, quads)
     expected = sh.signed_distance(whole.polyline(ends), whole).values
     np.testing.assert_allclose(values, expected[quads.ravel()], atol=1e-9)
+
+
+@pytest.mark.parametrize("copies", ["all", "all_turned", "one", "without_area"])
+def test_the_method_alone_leaves_copies_out_too(copies):
+    mesh = sphere(3)
+    circle = 2 * np.pi * np.arange(120) / 120
+    ring = np.stack([0.8 * np.cos(circle), 0.8 * np.sin(circle), 0.6 + 0 * circle], axis=1)
+    far = mesh.faces[mesh.vertices[mesh.faces].mean(axis=1)[:, 2].argmin()]
+    added = {
+        "all": mesh.faces,
+        "all_turned": mesh.faces[:, ::-1],
+        "one": far[None],
+        "without_area": far[None, [0, 1, 0]],
+    }[copies]
+    double = sh.TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, added]))
+
+    def values(surface):
+        pieces = [mesh.polyline(ring[k : k + 22]) for k in range(0, 120, 30)]  # the first faces are the same
+        solver = sh.SignedHeatSolver(surface)
+        one, [many] = solver.distance(pieces), solver.distance_many([pieces])
+        np.testing.assert_allclose(many.values, one.values, atol=1e-12)
+        assert one.domain is surface
+        return one.values
+
+    np.testing.assert_allclose(values(double), values(mesh), atol=1e-9)

@@ -219,11 +219,12 @@ def test_what_is_a_guess_is_announced_and_nothing_else(damage, seed, guessed):
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         values = sh.signed_distance(drawing.given, drawing.mesh).values
-    assert bool(told) == guessed
+    guesses = [each for each in told if "of the length of the curves was left out" not in str(each.message)]
+    assert bool(guesses) == guessed
     assert (strokes.wrong_share(drawing, values) > 0.06) == guessed
 
 
-@pytest.mark.filterwarnings("ignore:.*is a guess")
+@pytest.mark.filterwarnings("ignore:.*is a guess", "ignore:.*was left out")
 @pytest.mark.parametrize(("damage", "seed"), [("overlapping", 20000), ("scribbles", 20000), ("twice_turned", 20000)])
 def test_what_is_turned_and_left_out_does_not_depend_on_the_triangles_of_the_method(damage, seed):
     """Copies of strokes within the width of triangles are left out or not as these happen to lie."""
@@ -231,8 +232,8 @@ def test_what_is_turned_and_left_out_does_not_depend_on_the_triangles_of_the_met
     fields = [sh.signed_distance(drawing.given, drawing.mesh, intrinsic=way) for way in ("auto", True, False)]
     fields.append(completion(drawing.mesh, drawing.given, None, 1.0)[0])
     taken = [field.diagnostics.note(CurvesTaken) for field in fields]
-    assert taken[0].turned or taken[0].left_out
-    assert all((note.turned, note.left_out) == (taken[0].turned, taken[0].left_out) for note in taken)
+    assert (taken[0] is None) == (damage == "overlapping")  # copies by hand are as good as none: as given
+    assert len({str(note and (note.turned, note.left_out)) for note in taken}) == 1
 
 
 def test_of_two_edges_between_the_same_vertices_the_shorter_counts():

@@ -8,8 +8,9 @@ import pytest
 
 import signedheat as sh
 from shapes import strokes
-from signedheat.curves.curve_distance import CurvesTaken, MeshRepaired
+from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.diagnostics import VerticesJoined, WithoutLength
+from signedheat.surfaces.repaired_mesh import MeshRepaired
 
 
 def damaged(mesh, given, random):

@@ -135,3 +135,31 @@ def test_a_curve_across_polygons_is_the_zero_set():
     near = np.abs(np.hypot(vertices[:, 0], vertices[:, 1]) - 0.5) < 0.2
     exact = np.hypot(vertices[:, 0], vertices[:, 1]) - 0.5
     assert np.abs(phi.values - exact)[near].max() < 0.15 * 2 / 16
+
+
+@pytest.mark.parametrize("n", [1, 2, 5])
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_polygons_that_pass_an_edge_twice_have_holes(n, turn):
+    """A strip with square holes, each joined to a corner below by an edge that is passed there and back."""
+    corners = np.array([[3.0 * k, 0.0] for k in range(n + 1)] + [[3.0 * n, 3.0], [0.0, 3.0]])
+    hole = np.array([[1, 1], [1, 2], [2, 2], [2, 1]])
+    holes = [hole + np.array([3 * k, 0]) for k in range(n)]
+    order: list[int] = []
+    for k in range(n):
+        first = n + 3 + 4 * k
+        order += [k, first, first + 1, first + 2, first + 3, first, k]
+    polygon = [*order, n, n + 1, n + 2]
+    flat = np.concatenate([corners, *holes])
+    space = np.stack([flat[:, 0] * np.cos(turn), flat[:, 1], flat[:, 0] * np.sin(turn)], axis=1)
+    for shift in range(0, len(polygon), 3):
+        mesh = sh.PolygonMesh(space, [np.roll(polygon, shift).tolist()])
+        assert mesh.triangulation.n_vertices == len(flat)
+        triangles = flat[mesh.triangulation.faces]
+        sides, step = np.roll(triangles, -1, axis=1) - triangles, np.random.default_rng(0).uniform(size=(500, 2))
+        assert mesh.triangulation.face_areas.sum() == pytest.approx(8 * n, abs=1e-9)
+        away = step * [3 * n, 3] - triangles[:, :, None]
+        covered = (
+            (sides[:, :, None, 0] * away[..., 1] - sides[:, :, None, 1] * away[..., 0] > 0).all(axis=1).sum(axis=0)
+        )
+        x, y = (step * [3 * n, 3]).T
+        assert np.array_equal(covered, 1 - ((x % 3 > 1) & (x % 3 < 2) & (y > 1) & (y < 2)))

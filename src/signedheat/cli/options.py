@@ -26,7 +26,7 @@ Summary: TypeAlias = tuple[dict[str, Any], str]
 Run: TypeAlias = Callable[[Namespace], Summary]
 Check: TypeAlias = Callable[[Namespace], None]
 
-PLANAR = (".csv", ".svg")
+PLANAR = (".csv", ".dxf", ".geojson", ".svg")
 """Extensions of files with polylines in the plane."""
 IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
 """Extensions of files that may hold images of labels."""
@@ -324,7 +324,7 @@ def shape_option(planar: str = "") -> Option:
     )
 
 
-FLAT_SHAPE = shape_option("; in the plane, polylines: .svg .csv")
+FLAT_SHAPE = shape_option("; in the plane, polylines: .svg .csv .dxf .geojson")
 UP = option("--up", choices=["x", "y", "z"], default="z", help="axis that points up in the picture (z)")
 LABEL = option(
     "--label",

@@ -20,13 +20,14 @@ from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..parallel import PointTree
 from ..solver import SignedHeatSolver, distance_unwarned
+from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
-from .curve_distance import RepairedMesh, distance_to_pieces, warn_of_gaps
+from .curve_distance import distance_to_pieces, warn_of_gaps
 from .resolution import flattened, on_resolving_triangles
 from .stroke_directions import pieces_for_all
 

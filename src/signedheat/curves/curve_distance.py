@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numpy as np
 
@@ -19,88 +19,19 @@ from ..foreign import as_list
 from ..jobs import Progress
 from ..kinds import AnySurface, SurfaceDomain
 from ..mesh.components import connected_components, grouped
-from ..mesh.edges import orient_faces, pair_halfedges
-from ..mesh.welding import GAP_UNITS, SEAM_UNITS, coincident_faces, joined_rims
+from ..mesh.welding import GAP_UNITS, SEAM_UNITS, joined_rims
 from ..sharpening import sharpen
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
-from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
-from ..surfaces.surface_discretization import vertices_joined
+from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..surfaces.vertex_field import VertexField
 from ..validation import flag
 from ..words import percent
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, with_turned
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class MeshRepaired(Note):
-    """What was done to a mesh for distance on it: faces flipped, copies left out."""
-
-    faces_turned: int
-    copies: int
-    text: ClassVar[str] = "faces flipped: {0.faces_turned}; copies of faces: {0.copies}"
-
-
-@dataclass(frozen=True, eq=False)
-class RepairedMesh:
-    """A mesh with its seams joined and without copies of faces, which agree with their neighbours where they can."""
-
-    given: TriangleMesh  # the mesh before the repair
-    mesh: Any  # the mesh after it, a `TriangleMesh` on some of the same vertices
-    places: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
-    faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
-    corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
-    notes: tuple[Note, ...]  # what was done
-
-    @classmethod
-    def of(cls, given: object) -> RepairedMesh | None:
-        """Return a repaired triangle mesh; None if there is nothing to repair, or the shape given is none."""
-        if not isinstance(given, TriangleMesh):
-            return None
-        n, kept = given.n_vertices, np.unique(copied_faces(given.faces, given.n_vertices))
-        # beside a copy of its face, a rim looks like an edge of two faces
-        once = given if len(kept) == given.n_faces else TriangleMesh(given.vertices, given.faces[kept])
-        corners = once.places[given.faces]
-        kept, targets = np.unique(copied_faces(corners, n), return_inverse=True)
-        faces, areas = corners[kept], given.face_areas[kept]
-        turned = orient_faces(faces, areas, n).turned
-        copies = given.n_faces - len(kept)
-        if not (copies or turned.any()):
-            return None
-        faces = np.where(turned[:, None], faces[:, ::-1], faces)
-        to = (corners[:, :, None] == faces[targets][:, None]).argmax(axis=2)
-        notes = *vertices_joined(once), MeshRepaired(int(turned.sum()), copies)
-        return cls(given, TriangleMesh(given.vertices, faces), once.places, targets, to, notes)
-
-    def on_it(self, source: Any) -> Any:
-        """Move a curve, points, or a sequence of them to the repaired mesh; what does not fit the given one stays."""
-        if isinstance(source, Sequence):
-            return [self.on_it(part) for part in source]
-        if not isinstance(source, Curve | SurfacePoints):
-            return source
-        faces = source.faces
-        if not ((faces >= 0) & (faces < len(self.faces))).all():
-            return source
-        weights = np.zeros((len(faces), 3))
-        np.add.at(weights, (np.arange(len(faces))[:, None], self.corners[faces]), source.barycentric)
-        if isinstance(source, SurfacePoints):
-            return SurfacePoints(self.faces[faces], weights)
-        return Curve(self.faces[faces], weights, source.closed, source.oriented, source.normals)
-
-    def on_given(self, field: VertexField[Any]) -> VertexField[Any]:
-        """Return a field on the repaired mesh, at the vertices of the given one."""
-        values = field.values[self.places]
-        diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(*self.notes)
-        return VertexField(self.given, values, diagnostics)
-
-    def curve_on_given(self, curve: Curve) -> Curve:
-        """Return a curve on the repaired mesh as one on the given mesh; of copies of a face, it is on the first."""
-        faces = np.unique(self.faces, return_index=True)[1][curve.faces]
-        weights = np.take_along_axis(curve.barycentric, self.corners[faces], axis=1)
-        return Curve(faces, weights, curve.closed, curve.oriented, curve.normals)
 
 
 def warn_of_gaps(mesh: object) -> None:
@@ -124,21 +55,13 @@ def _halfedges(mesh: TriangleMesh | PolygonMesh) -> tuple[Ints, Ints]:
     return mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
 
 
-def copied_faces(faces: Ints, n_vertices: int) -> Ints:
-    """(m,) first face on the vertices of each face with an edge of more than two faces; elsewhere the face itself."""
-    first = np.arange(len(faces))
-    pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
-    crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
-    if len(crowded):
-        copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
-        first[crowded] = np.where(copies < 0, crowded, crowded[copies])
-    return first
-
-
 UNTRUSTWORTHY = 0.1
 """The shortest completion and that by heat are announced as untrustworthy if they differ on this share of the area.
 Half as much announces no more of 259 drawings; two of 30 curves in twelve pieces, half gone, are announced for this
 reason alone, and both are wrong."""
+
+MOST_LEFT_OUT = 0.25
+"""There is a warning if more than this share of the length of the curves is left out."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 
@@ -154,8 +77,7 @@ class CurvesTaken(Note):
     left_out : (k,) int
         Curves that bound nothing together with the others.
     share_left_out : float
-        Their share of the length of all curves. A large share is no reason to warn: of 515 drawings on which every
-        wrong answer is announced otherwise, it is more than a twentieth on a quarter of those that are right.
+        Their share of the length of all curves.
     """
 
     turned: list[int]
@@ -199,28 +121,31 @@ def distance_to_pieces(
     if pieces is None:
         return distance_unwarned(solver, listed, constraint), listed
     if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):
-        warn_user(
-            "curves run where faces cannot agree which side of them is left, on a surface with one side or across "
-            "edges of more than two faces: pieces were taken as they are, and which side is which away from them is a "
-            "guess. Leave out faces, or close the curves",
-            InexactWarning,
-        )
+        if pieces.is_piece.any():
+            warn_user(
+                "curves run where faces cannot agree which side of them is left, on a surface with one side or across "
+                "edges of more than two faces: pieces were taken as they are, and which side is which away from them "
+                "is a guess. Leave out faces, or close the curves",
+                InexactWarning,
+            )
         return distance_unwarned(solver, listed, constraint), listed
-    decision = decide(pieces)
+    decision = decide(pieces, every_piece)
     turn = decision.turned(len(listed))
     left_out = pieces.curves(decision.loose)
-    if every_piece or decision.bounds_nothing:
-        left_out = left_out[:0]
     taken = [curve for k, curve in enumerate(with_turned(listed, turn)) if k not in set(left_out.tolist())]
     field = distance_unwarned(once, taken, constraint)
     turn[left_out] = False
+    share = float(pieces.strokes.lengths[decision.loose].sum() / pieces.strokes.lengths.sum())
     if turn.any() or len(left_out):
-        strokes = pieces.strokes
-        share = float(strokes.lengths[decision.loose].sum() / strokes.lengths.sum()) if len(left_out) else 0.0
         note = CurvesTaken(numbers[turn].tolist(), numbers[left_out].tolist(), share)
         field = replace(field, diagnostics=field.diagnostics.noting(note))
     reason = reason_for_doubt(decision, field, listed, numbers)
     loops = numbers[decision.loops_left_out()] if len(left_out) else left_out
+    if share > MOST_LEFT_OUT and not reason:
+        reason = (
+            f"{share:.0%} of the length of the curves was left out, as it bounds nothing with the others: "
+            f"{named(numbers[left_out])}. Draw what is missing; every_piece=True takes all curves"
+        )
     if len(loops) and not reason:
         reason = (
             f"what goes round, but bounds nothing with the others, was left out: {named(loops)}. every_piece=True "
@@ -292,7 +217,7 @@ def reason_for_doubt(
             "the curves bound something else as well: which of the two is meant is a guess. Draw what is missing, or "
             f"turn curves that face the wrong way; {as_given}"
         )
-    doubtful = numbers[decision.worth_little(field.values)]
+    doubtful = numbers[decision.worth_little()]
     if len(doubtful):
         return (
             f"the region depends on {named(doubtful)}, and closing the gaps takes lines more than half as long: that "

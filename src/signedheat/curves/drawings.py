@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
 from ..area_elements import bounds_around
@@ -18,20 +19,22 @@ from ..errors import ConstraintError
 from ..foreign import as_list
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_field import GridField
+from ..grids.marching import values_at_walls
 from ..grids.polyline import Polyline
 from ..grids.solid_queries import Closest
 from ..jobs import Progress, Stopwatch, within
 from ..kinds import Sources
-from ..mesh.components import sums_of
-from ..mesh.polylines import FillRule, filled_outlines, without_seams
-from ..mesh.triangles import AREA_ROUNDING
+from ..mesh.components import connected_components, sums_of
+from ..mesh.polylines import FillRule, without_seams
 from ..mesh.unit_vectors import unit
 from ..search.face_tree import FaceTree
 from ..solver import SignedHeatSolver
 from ..surfaces.extrapolation import Diffusion
+from ..surfaces.source_segments import NEARLY_CLOSED
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import SMALLEST_EXTENT, flag, query_points, shaped
 from .curve_distance import CurvesTaken, distance_to_pieces
+from .outlines import outlines_filled
 from .resolution import on_resolving_triangles
 
 FINEST_DRAWING = 1024
@@ -40,6 +43,8 @@ differ by 0.010 of their radius between 128 and 512 cells, by 0.007 between 128 
 STROKE_NODES = 96
 """Number of nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong
 in silence and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
+LEAST_SLOPE = 1e-6
+"""Sine of the angle between the tangent at a corner and the way to a point, from which on the normal decides."""
 SIDE_CELLS = 1.5
 """Within this distance, in cells, a line decides the side itself: φ is smooth over about a cell."""
 
@@ -62,7 +67,8 @@ def distance_to_lines(
 
     Closed outlines become the boundary of what they fill. If strokes are left, they are turned until they bound
     something together; the signed heat method decides the sides on a grid around the whole drawing, and completes the
-    lines. In other dimensions than two, φ is returned as the method gives it.
+    lines. What is bounded is inside, whichever way it runs. In other dimensions than two, φ is returned as the method
+    gives it.
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(
@@ -76,16 +82,24 @@ def distance_to_lines(
     if domain.dimension != 2:
         return SignedHeatSolver(domain, diffusion, progress).distance(listed, constraint)
     notes: list[Note] = []
-    if not as_oriented and all(isinstance(line, Polyline) for line in listed):
-        listed, numbers, filled = outlines_filled(listed, fill)
+    is_drawing = not as_oriented and all(isinstance(line, Polyline) for line in listed)
+    if is_drawing:
+        listed, numbers, filled = outlines_filled(listed, fill, 1 / FINEST_DRAWING)
         notes += [filled] if filled else []
         if filled and all(line.closed for line in listed):
             drawing = Drawing(without_seams(segments_of_lines(listed)))
             return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)), progress)
-        listed, taken = strokes_that_agree(listed, numbers, every_piece, within(progress, 0.0, 0.4))
+        listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece, within(progress, 0.0, 0.4))
         notes += [taken] if taken else []
     solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
     phi = cast("GridField[Literal[2]]", solver.distance(listed, constraint))
+    if is_drawing:
+        closing = closing_lines(listed)
+        if closing and bulges(phi, listed, closing):
+            phi = cast("GridField[Literal[2]]", solver.distance([*listed, *closing], constraint))
+        beyond = values_at_walls(phi.values) < 0
+        if beyond.all() or (closing and beyond.mean() > 0.5):  # what is bounded is inside, whichever way it runs
+            listed, phi = [line.reversed() for line in listed], phi.with_values(-phi.values)
     drawing = Drawing.completed(segments_of_lines([line for line in listed if isinstance(line, Polyline)]), phi)
     diagnostics = replace(phi.diagnostics, notes=(*phi.diagnostics.notes, *notes))
     return _field_of(drawing, domain, diagnostics, progress)
@@ -100,38 +114,52 @@ def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: 
     return GridField(grid, values, replace(diagnostics, timings=timings), solid=drawing)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class OutlinesFilled(Note):
-    """How closed outlines were filled: by which rule, how many, and which share of their length lies inside."""
+def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
+    """Return lines of which each that nearly closes runs round what is inside if it is within an even number of others.
 
-    rule: str
-    outlines: int
-    length_inside: float
-    text: ClassVar[str] = (
-        "closed outlines: {0.outlines}, filled by the rule {0.rule}; {0.length_inside:%} of their length lies inside"
-    )
-
-    @property
-    def important(self) -> bool:
-        return self.length_inside > AREA_ROUNDING
-
-
-def outlines_filled(
-    lines: Sequence[Polyline], rule: FillRule
-) -> tuple[list[Polyline], list[int], OutlinesFilled | None]:
-    """Return the outlines of what closed lines fill, then lines that are not closed; and a note if any are filled.
-
-    Also return numbers to name these by: open lines keep theirs, and outlines have those of closed lines, in order, or
-    higher ones if there are more of them.
+    Closed lines are outlines of what is inside already.
     """
-    closed, strokes = ([k for k, line in enumerate(lines) if line.closed == wanted] for wanted in (True, False))
-    filled = [Polyline(points, closed=True) for points in filled_outlines([lines[k].points for k in closed], rule)]
-    if not filled:
-        return list(lines), list(range(len(lines))), None
-    given, left = sum(lines[k].length for k in closed), sum(line.length for line in filled)
-    note = OutlinesFilled(rule, len(closed), max(0.0, 1.0 - left / given))
-    numbers = [*closed, *range(len(lines), len(lines) + len(filled))][: len(filled)]
-    return [*filled, *(lines[k] for k in strokes)], [*numbers, *strokes], note
+    gaps = [np.linalg.norm(line.points[-1] - line.points[0]) for line in lines]
+    nearly = [k for k, line in enumerate(lines) if not line.closed and gaps[k] < NEARLY_CLOSED * line.length]
+    if not nearly:
+        return list(lines)
+    closed = [Polyline(lines[k].points, closed=True) for k in nearly]
+    begins = np.array([line.points[0] for line in closed])
+    depths = _enclosed(segments_of_lines([line for line in lines if line.closed]), begins).astype(np.int64)
+    for number, line in enumerate(closed):
+        within = _enclosed(line.segments, begins)
+        within[number] = False
+        depths += within
+    result = list(lines)
+    for k, line, depth in zip(nearly, closed, depths.tolist(), strict=True):
+        if (line.signed_area > 0) == (depth % 2 == 0):
+            result[k] = result[k].reversed()
+    return result
+
+
+def closing_lines(lines: Sequence[Polyline]) -> list[Polyline]:
+    """Return straight lines across the gaps of curves that nearly close, from the end of a stroke to the next one.
+
+    Strokes are one curve if they follow each other, each the nearest one to the end of the last.
+    """
+    strokes = [line for line in lines if not line.closed]
+    if not strokes:
+        return []
+    begins, ends = (np.array([line.points[k] for line in strokes]) for k in (0, -1))
+    gaps, following = scipy.spatial.cKDTree(begins).query(ends)
+    curve = connected_components(len(strokes), np.arange(len(strokes)), following)
+    closes = np.bincount(curve, gaps) < NEARLY_CLOSED * np.bincount(curve, [line.length for line in strokes])
+    wide = np.flatnonzero(closes[curve] & (gaps > 0))
+    return [Polyline([ends[k], begins[following[k]]]) for k in wide.tolist()]
+
+
+def bulges(phi: GridField[Literal[2]], lines: Sequence[Polyline], closing: Sequence[Polyline]) -> bool:
+    """Return whether heat leaves a gap open, as between parallel strokes, or closes it by a bulge as long as itself."""
+    beyond = values_at_walls(phi.values) < 0
+    if beyond.any() and not beyond.all():
+        return True
+    away = tree_of(segments_of_lines([*lines, *closing])).distances(_in_space(segments_of_lines(phi.contour())[:, 0]))
+    return bool(away.max() > max(line.length for line in closing))
 
 
 def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
@@ -275,15 +303,21 @@ class Drawing(Frozen):
         corners, sums, counts = self._corners
         ends = self.lines[nearest]
         along = ends[:, 1] - ends[:, 0]
-        normals, crowded = np.stack([-along[:, 1], along[:, 0]], axis=1), np.zeros(len(points), dtype=bool)
+        normals = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        crowded = np.zeros(len(points), dtype=bool)
         reach = 1e-9 * np.linalg.norm(along, axis=1)
         for end in range(2):
             is_end = np.linalg.norm(places - ends[:, end], axis=1) <= reach
             corner = corners[nearest, end]
             normals = np.where(is_end[:, None], sums[corner], normals)
             crowded |= is_end & (counts[corner] > 2)
-        sides = np.where(((points - places) * normals).sum(axis=1) < 0, -1.0, 1.0)
-        if self.phi is None and crowded.any():  # outlines touch there, and their normals may cancel
+        heights = ((points - places) * normals).sum(axis=1)
+        sides = np.where(heights < 0, -1.0, 1.0)
+        slopes = np.abs(heights) / np.maximum(np.linalg.norm(normals, axis=1), SMALLEST_EXTENT)
+        crowded |= slopes <= LEAST_SLOPE * np.linalg.norm(points - places, axis=1)
+        if (
+            self.phi is None and crowded.any()
+        ):  # outlines touch there, and their normals may cancel, or corners are near
             sides[crowded] = np.where(_enclosed(self.lines, points[crowded]), -1.0, 1.0)
         return sides
 
@@ -305,7 +339,7 @@ def _enclosed(outlines: Floats, points: Floats) -> Bools:
     """(n,) whether points are within outlines that do not cross: rays from them meet an odd number of segments."""
     inside = np.zeros(len(points), dtype=bool)
     a, b = outlines.transpose(1, 0, 2)
-    step = max(1, 10**6 // len(outlines))  # a million pairs at a time
+    step = max(1, 10**6 // max(len(outlines), 1))  # a million pairs at a time
     for begin in range(0, len(points), step):
         x, y = points[begin : begin + step, None].transpose(2, 0, 1)
         spans = (a[:, 1] <= y) != (b[:, 1] <= y)

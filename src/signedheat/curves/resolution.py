@@ -82,7 +82,7 @@ def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
 def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
     """Return the curves and points, without the groups that they were given in."""
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
-    return list(chain.from_iterable(c if isinstance(c, Sequence) else [c] for c in listed))
+    return list(chain.from_iterable(c if isinstance(c, Sequence) and not isinstance(c, str) else [c] for c in listed))
 
 
 def for_zero_set(

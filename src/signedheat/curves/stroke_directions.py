@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -25,6 +26,15 @@ from ..surfaces.surface_discretization import SurfaceDiscretization
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .strokes import EQUAL_COSTS, EXPLAINED, Inside, Strokes
 
+CLEAR = 0.01
+"""Strokes are taken as given without a look at other readings if they leave at most this share of their length
+unexplained."""
+TIE = 0.05
+"""Another reading than as given must leave less unexplained by more than this share."""
+MISSING = 2.0
+"""Share of the length of the strokes from which on what is unexplained makes the inside a guess."""
+UNDRAWN = 0.25
+"""Share of the length of the strokes from which on lines that touch none of them make the inside a guess."""
 TURNING_COST = 0.5
 """Cost of turning a stroke, relative to its length. Halved or doubled, one of 46 drawings changes on more than 2 % of
 the area."""
@@ -49,7 +59,7 @@ are wrong in silence and 23 right with a warning; doubled, 9 and 15."""
 
 @dataclass(frozen=True, eq=False)
 class CurvePieces:
-    """Oriented curves on a surface, as strokes; those that end inside the surface may be turned.
+    """Oriented curves on a surface, as strokes.
 
     Curves that go on in each other, head to tail, are one stroke. Strokes are ordered by place, so that nothing depends
     on how curves are numbered.
@@ -57,12 +67,13 @@ class CurvePieces:
 
     numbers: Ints  # (j,) which of the curves given are oriented, ordered by place
     stroke: Ints  # (j,) the stroke that each of these is part of
-    movable: Bools  # (k,) whether each stroke is a piece: open, and not from boundary to boundary of the surface
+    movable: Bools  # (k,) whether each stroke may be turned
+    is_piece: Bools  # (k,) whether it ends inside the surface
     strokes: Strokes  # the strokes, and the energy of the sets that they may bound
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
-        """Return the oriented curves as strokes; None if none of these may be turned."""
+        """Return the oriented curves as strokes; None if there is nothing to decide about them."""
         numbers = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented]
         listed = [cast("Curve", curves[k]) for k in numbers]
         if not listed:
@@ -76,13 +87,14 @@ class CurvePieces:
         by_points = np.array([curve.normals is None for curve in listed])
         first, copy = without_copies(each, by_points)
         parts, stroke = joined_end_to_end([each[k] for k in first], by_points[first])
-        movable = np.array([is_piece(surface.triangles, part) for part in parts])
-        if not movable.any():
+        is_piece = np.array([not is_whole(surface.triangles, part) for part in parts])
+        movable = np.array([may_turn(surface.triangles, part) for part in parts])
+        if not movable.any() or (len(parts) == 1 and not is_piece[0]):
             return None
         group, gaps = likely_curves(np.concatenate([places[order[k]][[0, -1]] for k in first]), stroke)
         is_loop = gaps < NEARLY_CLOSED * np.bincount(group, [part.lengths.sum() for part in parts])
         strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group, is_loop)
-        return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, strokes)
+        return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, is_piece, strokes)
 
     def curves(self, chosen: Bools) -> Ints:
         """Numbers of the curves that make up the strokes chosen by (k,) bool."""
@@ -91,23 +103,31 @@ class CurvePieces:
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """The directions of the pieces of curves."""
+    """The reading of curves that leaves the least length unexplained."""
 
     pieces: CurvePieces  # the curves
-    best: Inside  # the best directions that were found, and what is inside then
-    # whether most of the length bounds nothing at the least energy, so that directions are those of `smooth_signs`
-    bounds_nothing: bool = False
-    tied: bool = False  # whether another answer, which costs the same, has something else inside
+    reading: Inside  # the directions of strokes, 0 where they are left out, and the sides by heat
+    tied: bool = False  # whether another reading, which leaves as little unexplained, has something else inside
+
+    @cached_property
+    def best(self) -> Inside:
+        """The sides of shortest boundary for the same directions."""
+        return self.pieces.strokes.inside(self.reading.signs)
 
     def turned(self, n: int) -> Bools:
         """(n,) which of all curves given are turned."""
-        return mask_of(n, self.pieces.curves(self.best.signs < 0))
+        return mask_of(n, self.pieces.curves(self.reading.signs < 0))
 
     @property
     def loose(self) -> Bools:
-        """(k,) which movable strokes bound nothing, if others bound something."""
-        movable, explained = self.pieces.movable, self.best.explained >= EXPLAINED
-        return movable & ~explained & explained.any()
+        """(k,) which strokes are left out."""
+        return np.asarray(self.reading.signs == 0)
+
+    @property
+    def bounds_nothing(self) -> bool:
+        """Whether far more of the curves is missing than there is, or much of the boundary touches none of them."""
+        strokes, length = self.pieces.strokes, float(self.pieces.strokes.lengths.sum())
+        return strokes.unexplained(self.reading) > MISSING * length or strokes.undrawn(self.reading) > UNDRAWN * length
 
     def loops_left_out(self) -> Ints:
         """Return the numbers of curves of loops that bound nothing, but would bound something without the others."""
@@ -115,7 +135,7 @@ class Decision:
         found = np.zeros(len(self.loose), dtype=bool)
         for group in np.flatnonzero(strokes.whole_loops(self.loose)).tolist():
             in_loop = strokes.group == group
-            alone = strokes.inside(np.where(in_loop, self.best.signs, 0.0))
+            alone = strokes.inside(np.where(in_loop, 1.0, 0.0))
             if (alone.explained[in_loop] >= EXPLAINED).any():
                 found |= in_loop
         return self.pieces.curves(found)
@@ -135,29 +155,23 @@ class Decision:
         few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()
         return self.pieces.curves(against & (not few))
 
-    def worth_little(self, values: Floats) -> Ints:
+    def worth_little(self) -> Ints:
         """Return the numbers of curves on which the inside depends, although they are worth little.
 
-        A stroke is worth what the least cost rises by without it: an arc alone, its length less that of its gap; a
-        stray stroke little, because lines are added for it. The inside changes where the cut without the stroke does,
-        and, away from strokes, where that cut and (n,) values of the field disagree: heat closes an arc by a larger
-        bulge than lines do.
+        A stroke is worth what more is unexplained without it: a piece of a curve, what it closes and its length; an arc
+        alone, its length less that of its gap; a stray stroke little, because a line is added for it.
         """
-        strokes, best, own = self.pieces.strokes, self.best, self.pieces.strokes.surface.restriction
-        missing = cost(strokes, best) + strokes.lengths.sum()  # a stroke is worth its length less this, or more
-        chosen = longest_of(strokes, np.flatnonzero((1 - WORTH) * strokes.lengths < missing))
-        without = settled_from(strokes, [altered(best.signs, [k], 0.0) for k in chosen.tolist()], self.pieces.movable)
-        worth = np.array([cost(strokes, rival) - cost(strokes, best) for rival in without])
-        areas, away = strokes.areas[own], np.diff(strokes.means.tocsc().indptr)[own] == 0
-
-        def depending(rival: Inside) -> float:
-            by_lines = (rival.sides != best.sides)[own]
-            by_heat = away & (rival.sides[own] * values < 0)
-            return float(areas[by_lines | by_heat].sum()) if by_lines.any() else 0.0
-
-        share = np.array([depending(rival) for rival in without]) / areas.sum()
-        little = chosen[(worth < WORTH * strokes.lengths[chosen]) & (share > CHANGED_AREA)]
-        return self.pieces.curves(mask_of(len(best.signs), little))
+        strokes, reading = self.pieces.strokes, self.reading
+        missing = strokes.unexplained(reading)  # a stroke is worth its length less this, or more
+        may_be = (reading.signs != 0) & ((1 - WORTH) * strokes.lengths < missing)
+        little = np.zeros(len(may_be), dtype=bool)
+        for k in longest_of(strokes, np.flatnonzero(may_be)).tolist():
+            signs = altered(reading.signs, [k], 0.0)
+            without = strokes.by_heat(signs) if signs.any() else None
+            worth = (strokes.lengths.sum() if without is None else strokes.unexplained(without)) - missing
+            changed = 1.0 if without is None else strokes.changed_share(reading, without)
+            little[k] = worth < WORTH * strokes.lengths[k] and changed > CHANGED_AREA
+        return self.pieces.curves(little)
 
 
 def order_in_space(places: Sequence[Floats]) -> Ints:
@@ -179,24 +193,64 @@ def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
     return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
 
 
-def is_piece(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
-    """Whether a stroke has an end away from the boundary of the surface, and from nonmanifold edges."""
-    if part.ends[0, 0] == part.ends[-1, 1]:
-        return False
-    edges = triangles.edges
-    # at an edge of three faces a direction in one of them says nothing about the others
-    at_boundary = mask_of(triangles.n_vertices, edges.vertices[edges.face_counts != 2])
+def is_whole(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
+    """Whether a stroke is closed, or goes from boundary to boundary of the surface."""
+    return is_closed(part) or _ends_on(triangles, part, triangles.edges.face_counts == 1)
+
+
+def may_turn(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
+    """Whether a direction means something: at an edge of three faces one in one of them says nothing of the others."""
+    return is_whole(triangles, part) or not _ends_on(triangles, part, triangles.edges.face_counts != 2)
+
+
+def is_closed(part: CurveSegments) -> bool:
+    """Whether a stroke ends where it begins."""
+    return bool(part.ends[0, 0] == part.ends[-1, 1])
+
+
+def _ends_on(triangles: IntrinsicMesh, part: CurveSegments, is_edge: Bools) -> bool:
+    """Whether both ends of a stroke lie on some edges, (e,)."""
+    on = mask_of(triangles.n_vertices, triangles.edges.vertices[is_edge])
     ends = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
-    return not all(at_boundary[ends[end].indices].all() for end in (0, 1))
+    return all(bool(on[ends[end].indices].all()) for end in (0, 1))
 
 
-def decide(pieces: CurvePieces) -> Decision:
-    """Return the directions of strokes for which the inside costs least; only movable strokes may be turned.
+def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
+    """Return the reading of strokes that leaves the least length unexplained by heat: as given, turned, or left out.
 
-    Cuts and directions are improved in turn. If most of the length then bounds nothing, `smooth_signs` decides instead.
+    As given is the first, and is taken if no other leaves clearly less. `every_piece` leaves none out.
     """
     strokes, movable = pieces.strokes, pieces.movable
+    given = strokes.by_heat(np.ones(len(movable)))
+    if strokes.unexplained(given) <= CLEAR * strokes.lengths.sum():
+        return Decision(pieces, given)
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
+    rivals = cheapest(strokes, movable, smooth)
+    proposed = [rivals[0].signs, smooth]
+    if not every_piece:
+        proposed += [without_loose(rivals[0], movable), without_loose(strokes.inside(given.signs), movable)]
+    readings = [given, *(strokes.by_heat(signs) for signs in proposed if signs.any())]
+    lengths = np.array([strokes.unexplained(reading) for reading in readings])
+    is_good = lengths <= (1 + TIE) * max(float(lengths.min()), 0.0) + EQUAL_COSTS * strokes.lengths.sum()
+    reading = readings[int(is_good.argmax())]
+    if reading is given:
+        return Decision(pieces, given)
+    others = [other for other, good in zip(readings, is_good, strict=True) if good]
+    apart = [strokes.changed_share(other, reading) for other in others]
+    apart += [strokes.either_way(rivals[0]), *(strokes.changed_share(rival, rivals[0]) for rival in rivals)]
+    return Decision(pieces, reading, tied=max(apart) > CHANGED_AREA)
+
+
+def without_loose(inside: Inside, movable: Bools) -> Floats:
+    """(k,) directions of strokes, 0 for those that bound nothing."""
+    return np.where(movable & (inside.explained < EXPLAINED), 0.0, inside.signs)
+
+
+def cheapest(strokes: Strokes, movable: Bools, smooth: Floats) -> list[Inside]:
+    """Return all insides found that cost least, those for which fewer strokes are turned first.
+
+    Cuts and directions are improved in turn, from the given and the `smooth` directions; only movable strokes turn.
+    """
     best = least_of(strokes, settled_from(strokes, [np.ones(len(movable)), smooth], movable))
     while True:
         starts = [np.where(movable, -best.signs, best.signs)]
@@ -205,14 +259,9 @@ def decide(pieces: CurvePieces) -> Decision:
         if better is best:
             break
         best = better
-    loose = best.explained < EXPLAINED
-    if strokes.lengths[loose].sum() > strokes.lengths[~loose].sum():  # more of the curves is missing than there is
-        return Decision(pieces, strokes.inside(smooth), bounds_nothing=True)
     most = misfit(strokes, best) + EQUAL_COSTS * strokes.lengths.sum()
-    rivals = [inside for inside in strokes.seen if misfit(strokes, inside) <= most]
-    best = min(rivals, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
-    otherwise = [strokes.either_way(best), *(strokes.areas[inside.sides != best.sides].sum() for inside in rivals)]
-    return Decision(pieces, best, tied=bool(max(otherwise) > CHANGED_AREA * strokes.areas.sum()))
+    rivals = [inside for inside in strokes.seen if inside.signs.all() and misfit(strokes, inside) <= most]
+    return sorted(rivals, key=lambda inside: (int((inside.signs < 0).sum()), (inside.signs < 0).tolist()))
 
 
 def least_of(strokes: Strokes, insides: list[Inside]) -> Inside:
@@ -245,8 +294,7 @@ def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]
     loose, others = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
     longest = [longest_of(strokes, rows).tolist() for rows in (loose, others)]
     curves = strokes.group[longest[0] + longest[1]]
-    several = [curve for curve in dict.fromkeys(curves.tolist()) if (curves == curve).sum() > 1]
-    together = [np.flatnonzero(movable & (strokes.group == curve)).tolist() for curve in several]
+    together = [np.flatnonzero(movable & (strokes.group == k)).tolist() for k in dict.fromkeys(curves.tolist())]
     return [*together, loose.tolist(), *([k] for k in longest[0] + longest[1])] if len(loose) else together
 
 
@@ -385,7 +433,7 @@ def curve_orientation(
     turned, agreement = np.zeros(len(listed), dtype=bool), np.ones(len(listed))
     pieces = pieces_for_all(surface, listed)
     if pieces is not None:
-        decision = decide(pieces)
+        decision = decide(pieces, every_piece=True)
         turned = decision.turned(len(listed))
         explained = np.where(pieces.movable, np.clip(decision.best.explained, 0.0, 1.0), 1.0)
         agreement[pieces.numbers] = explained[pieces.stroke]

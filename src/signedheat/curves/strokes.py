@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,13 +12,16 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
+from ..constraints import ZeroSet
 from ..geodesics.exact_distance import shortest_arcs
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
-from ..mesh.components import grouped, members_of, sums_of
+from ..mesh.components import connected_components, grouped, members_of, sums_of
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..method import diffuse, integrate, normalize
 from ..surfaces.surface_discretization import SurfaceDiscretization
+from ..validation import SMALLEST_EXTENT
 
 PULL_UNITS = 2.0**40
 """Sum of all pulls to one side after they are scaled to integers, with which the greatest flow is exact."""
@@ -221,6 +224,8 @@ STAIRCASE_LENGTH = 0.92
 """Length of a line relative to the length of the dual edges that it cuts."""
 CORNER_ON_SEGMENT = 1e-6
 """A corner is on a segment up to this height above it, relative to the longest side of its face."""
+FOLLOWED = 0.25
+"""The zero set follows a stroke where it is as near as this to the vertices beside it, in h."""
 EQUAL_COSTS = 1e-6
 """Two answers cost the same if they differ by less, relative to the length of all strokes: rounding would choose."""
 EXPLAINED = 0.5
@@ -232,7 +237,7 @@ STROKES_AT_ONCE = 64
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """The best sides for strokes that run in given directions."""
+    """Sides for strokes that run in given directions."""
 
     signs: Floats  # (k,) directions relative to the given ones: 1, −1 if turned, 0 if the stroke is left out
     sides: Floats  # (n,) 1 or −1 at every vertex
@@ -248,6 +253,7 @@ class Strokes:
     """Oriented curves on a surface, and the energy of sets of vertices that they may bound."""
 
     surface: SurfaceDiscretization  # the surface that they lie on
+    parts: Sequence[CurveSegments]  # the strokes
     lengths: Floats  # (k,) length of each stroke
     # (k, n) half the mean over the vertices left of a stroke, less that over those right of it
     means: sparse.csr_matrix
@@ -271,14 +277,14 @@ class Strokes:
         columns = seen.tocsc()
         tail, head = columns[:, tails].tocsr(), columns[:, heads].tocsr()
         crossed = sparse.csr_matrix(tail.multiply(head.astype(bool)) - head.multiply(tail.astype(bool)))
-        crossed.data = np.sign(np.rint(crossed.data))
-        crossed.eliminate_zeros()
         areas = triangles.vertex_areas
         width = min(STROKE_WIDTH * edge, WIDEST_STROKE * float(lengths.sum()))
         around = widened(triangles, seen, width)
+        crossed.data = np.sign(np.rint(crossed.data))
+        crossed.eliminate_zeros()
         left, right = (_means(around.multiply(around * side > 0), areas) for side in (1, -1))
         means = sparse.csr_matrix(0.5 * (left - right))
-        return cls(surface, lengths, means, crossed, fluxes_across(triangles, parts), width, group, is_loop)
+        return cls(surface, parts, lengths, means, crossed, fluxes_across(triangles, parts), width, group, is_loop)
 
     @property
     def areas(self) -> Floats:
@@ -319,6 +325,26 @@ class Strokes:
             result[:, begin : begin + STROKES_AT_ONCE] = fluxes @ blur.solve(np.asfortranarray(masses @ sides))
         return 0.5 * (result + result.T)
 
+    def unexplained(self, inside: Inside) -> float:
+        """Return the length of the boundary of the inside where no stroke is, and of strokes that it does not follow.
+
+        Strokes that are left out count in full, and those that bound it the wrong way round twice.
+        """
+        return inside.energy + float(self.lengths.sum())
+
+    def undrawn(self, inside: Inside) -> float:
+        """Return the length of lines of the boundary of the inside that touch no stroke."""
+        edges = self.surface.triangles.edges
+        falling, rising = self._uncovered(inside.signs)
+        first, second = inside.sides[edges.vertices].T
+        is_drawn = np.where(first > second, falling == 0, rising == 0)[edges.face_edges]
+        is_cut = (first != second)[edges.face_edges]
+        pairs = [edges.face_edges[is_cut[:, k] & is_cut[:, k - 1]][:, [k, k - 1]] for k in range(3)]
+        line = connected_components(len(first), *np.concatenate(pairs).T)
+        cut = np.unique(edges.face_edges[is_cut])
+        drawn = np.unique(line[edges.face_edges[is_cut & is_drawn]])
+        return float(self.costs[cut[~np.isin(line[cut], drawn)]].sum())
+
     def whole_loops(self, chosen: Bools) -> Bools:
         """(g,) the loops all of whose strokes, (k,), are chosen."""
         whole: Bools = self.is_loop & (np.bincount(self.group, chosen) == np.bincount(self.group))
@@ -329,38 +355,90 @@ class Strokes:
         """Every result of `inside` so far."""
         return list(self._found.values())
 
+    def by_heat(self, signs: Floats) -> Inside:
+        """Return the sides that the method gives strokes with these (k,) directions, 0 if left out.
+
+        Where φ is nearly 0 beside a stroke, its zero set follows the stroke.
+        """
+        taken = [[replace(p, vectors=s * p.vectors)] for p, s in zip(self.parts, signs.tolist(), strict=True) if s]
+        source = self.surface.lower(taken, 1.0)
+        directions = normalize(self.surface, diffuse(self.surface, source))
+        phi, beside = integrate(self.surface, directions, source, ZeroSet()), self.means.T @ signs
+        is_near = np.abs(phi) <= FOLLOWED * self.surface.spacing
+        sides = np.where(np.where(is_near & (beside != 0), beside, phi) < 0, -1.0, 1.0)
+        # vertices on a stroke are on the side from which the boundary passes along the stroke
+        (tails, heads), (falling, rising) = self.surface.triangles.edges.vertices.T, self._uncovered(signs)
+        more = np.zeros(len(sides))  # cost of being inside, less that of being outside
+        np.add.at(more, tails, np.where(sides[heads] < 0, falling, -rising))
+        np.add.at(more, heads, np.where(sides[tails] < 0, rising, -falling))
+        sides = np.where(is_near & (beside == 0) & (more != 0), -np.sign(more), sides)
+        explained = signs * (self.means @ sides)
+        boundary = self._zero_set_lengths(np.where(phi * sides > 0, phi, SMALLEST_EXTENT * sides))
+        uncovered = self._cut_costs(signs, sides)[self.surface.triangles.edges.face_edges] > 0
+        added = 0.5 * float(boundary @ uncovered.sum(axis=1))
+        return Inside(signs, sides, explained, added - float(self.lengths @ explained))
+
+    def _zero_set_lengths(self, phi: Floats) -> Floats:
+        """(m,) length of the zero set of φ, linear in each face."""
+        triangles = self.surface.triangles
+        corners, values = triangles.corner_positions, phi[triangles.corner_vertices]
+        following = np.roll(values, -1, axis=1)
+        crosses = (values < 0) != (following < 0)
+        shares = np.where(crosses, values / np.where(crosses, values - following, 1.0), 0.0)
+        places = np.where(crosses, corners + shares * (np.roll(corners, -1, axis=1) - corners), 0.0)
+        # of two edges, the ends of a segment: one less the other
+        signs = np.where(crosses, np.where(np.cumsum(crosses, axis=1) == 1, 1.0, -1.0), 0.0)
+        return np.abs((places * signs).sum(axis=1))
+
+    def _between(self, signs: Floats, sides: Floats) -> Inside:
+        """Return the sides, (n,), with what strokes explain of them."""
+        explained = signs * (self.means @ sides)
+        energy = float(self._cut_costs(signs, sides).sum()) - float(self.lengths @ explained)
+        return Inside(signs, sides, explained, energy)
+
+    def _cut_costs(self, signs: Floats, sides: Floats) -> Floats:
+        """(e,) what the boundary between the sides of vertices, (n,), costs at edges, 0 along strokes."""
+        falling, rising = self._uncovered(signs)
+        first, second = sides[self.surface.triangles.edges.vertices].T
+        return np.where(first > second, falling, np.where(first < second, rising, 0.0))
+
     def inside(self, signs: Floats) -> Inside:
         """Return the inside of least energy, a minimum cut, for strokes with these (k,) directions, 0 if left out."""
         key = signs.tobytes()
         if key not in self._found:
-            sides, boundary = self._cut(signs, -1.0)
-            explained = signs * (self.means @ sides)
-            energy = boundary - float(self.lengths @ explained)
-            self._found[key] = Inside(signs, sides, explained, energy)
+            self._found[key] = self._between(signs, self._cut(signs, -1.0))
         return self._found[key]
 
+    def changed_share(self, one: Inside, other: Inside) -> float:
+        """Return the share of the area that is on different sides."""
+        return float(self.areas[one.sides != other.sides].sum() / self.areas.sum())
+
     def either_way(self, inside: Inside) -> float:
-        """Return the area between the smallest and largest inside of least energy; 0 if the same strokes bound both."""
+        """Return the share of the area between the smallest and the largest inside of least energy.
+
+        It is 0 if the same strokes bound both.
+        """
         labels = self.surface.triangles.face_components
         parts = np.zeros(self.surface.triangles.n_vertices, dtype=np.int64)
         parts[self.surface.triangles.corner_vertices] = labels[:, None]
         reached = np.isin(parts, parts[np.unique(self.means.indices)])
-        largest = self._cut(inside.signs, 1.0)[0]
+        largest = self._cut(inside.signs, 1.0)
         if np.abs(inside.signs * (self.means @ largest) - inside.explained).max() < EXPLAINED:
             return 0.0
-        return float(self.areas[reached & (largest != inside.sides)].sum())
+        return float(self.areas[reached & (largest != inside.sides)].sum() / self.areas.sum())
 
-    def _cut(self, signs: Floats, larger: float) -> tuple[Floats, float]:
-        """Return sides of least energy, and what the edges cut cost; of several, the largest (1) or smallest (−1)."""
+    def _cut(self, signs: Floats, larger: float) -> Floats:
+        """(n,) sides of least energy; of several, the largest (1) or smallest (−1)."""
+        pull = self.means.T @ (self.lengths * signs)
+        ties = larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
+        return self.graph.cut(*self._uncovered(signs), pull, ties)
+
+    def _uncovered(self, signs: Floats) -> tuple[Floats, Floats]:
+        """(e,) twice: what the boundary costs at edges, if their first or their second vertex is inside."""
         along = self.crossed.multiply(signs[:, None]).tocsr()
         covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
-        pull = self.means.T @ (self.lengths * signs)
-        ties = larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
-        sides = self.graph.cut(falling, rising, pull, ties)
-        first, second = sides[self.surface.triangles.edges.vertices].T
-        boundary = np.where(first > second, falling, np.where(first < second, rising, 0.0))
-        return sides, float(boundary.sum())
+        return falling, rising
 
 
 def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:

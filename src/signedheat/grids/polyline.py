@@ -25,9 +25,11 @@ else:
 
 @dataclass(frozen=True, eq=False)
 class Polyline(Displayed, Frozen):
-    """Points in the plane, joined in order by straight segments; φ is positive to the left.
+    """Points in the plane, joined in order by straight segments.
 
-    A closed polyline that runs clockwise has φ < 0 inside, like a shape whose normals point outward.
+    `signed_distance` is negative inside what polylines bound, whichever way they run, and positive to the left of those
+    that bound nothing. With ``as_oriented=True``, and by `SignedHeatSolver`, it is positive to the left of all: inside
+    a closed polyline that runs clockwise it is negative.
 
     Parameters
     ----------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import cmath
+import json
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -13,12 +14,16 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..arrays import Complexes, Floats
+from ..curves.drawings import FINEST_DRAWING
+from ..curves.outlines import distinct, outlines_filled
 from ..errors import FileFormatError, GeometryError
+from ..geometries import geometry_of, polylines_of
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
 from .budgets import XML, charge, charge_tree
 from .files import PathLike, contents, damaged, format_for, reading, replacing
 from .point_files import read_point_lists, write_point_lists
+from .sandbox import parsed
 
 CURVE_PIECES = 64
 """Number of segments that approximate a Bézier curve or an arc."""
@@ -382,7 +387,10 @@ def read_polylines(path: PathLike) -> list[Polyline]:
         user units, 96 of which are an inch. The y axis, which points down in such files, is turned up, so that the left
         of a path is its left in the drawing. Subpaths without length are left out. Where a file says ``fill-rule:
         evenodd``, closed subpaths become the outlines of what they fill. ``.csv``: x and y on each line, an empty line
-        between polylines; a polyline is closed if its last point equals its first.
+        between polylines; a polyline is closed if its last point equals its first. ``.geojson``: lines, and the
+        rings of polygons, in the plane of their coordinates. ``.dxf``, by the package ezdxf: lines, polylines, arcs,
+        circles, ellipses, splines and hatches, those of blocks in their places, seen along z; what closes becomes the
+        outlines of what lies within an odd number of them.
 
     Returns
     -------
@@ -462,12 +470,42 @@ def write_polylines(lines: Polyline | Sequence[Polyline], path: PathLike) -> Non
         temporary.write_text(content, encoding="utf-8")
 
 
+def read_geojson(path: PathLike) -> list[tuple[Floats, bool]]:
+    """Read the lines of GeoJSON, and the rings of its polygons."""
+    try:
+        geometry = geometry_of(json.loads(contents(path)))
+    except (ValueError, RecursionError) as error:
+        raise damaged(f"it is not JSON ({error})") from error
+    if geometry is None:
+        raise damaged("it holds no geometry")
+    return [(line.points, line.closed) for line in polylines_of(geometry)]
+
+
+DXF_SAG = 1e-3
+"""Largest distance of a segment from the arc or spline that it approximates, relative to the drawing's size."""
+
+
+def read_dxf(path: PathLike) -> list[tuple[Floats, bool]]:
+    """Read the lines of a DXF drawing, those of blocks in their places, as seen from above; bends become segments.
+
+    Such files have no rule for filling, and parts with holes are drawn as outlines that run either way: closed ones
+    become the outlines of what lies within an odd number of them, copies left out.
+    """
+    found = parsed("dxf", path, "ezdxf", ".dxf files", sag=DXF_SAG)
+    lines = np.split(found["points"], np.cumsum(found["counts"])[:-1])
+    drawn = [Polyline(p, len(p) > 2 and bool((p[0] == p[-1]).all())) for p in lines if (p != p[0]).any()]
+    outlines, _, _ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", 1 / FINEST_DRAWING)
+    return [(line.points, line.closed) for line in outlines]
+
+
 POLYLINE_READERS: dict[str, Callable[[PathLike], list[tuple[Floats, bool]]]] = {
     ".csv": lambda path: read_point_lists(path, 2),
+    ".dxf": read_dxf,
+    ".geojson": read_geojson,
     ".svg": read_svg,
 }
 POLYLINE_WRITERS: dict[str, Callable[[Sequence[Polyline]], str]] = {
     ".csv": lambda lines: write_point_lists([(line.points, line.closed) for line in lines]),
     ".svg": svg,
 }
-POLYLINE_FORMATS = frozenset(POLYLINE_READERS)
+POLYLINE_FORMATS = frozenset(POLYLINE_WRITERS)

@@ -122,6 +122,24 @@ def nifti(path: str) -> dict[str, Any]:
     return {"values": np.asarray(image.dataobj), "affine": np.asarray(image.affine, dtype=np.float64)}
 
 
+def dxf(path: str, sag: float) -> dict[str, Any]:
+    """Read the lines of a DXF drawing as seen along z, with their numbers of points; `sag` is relative to its size."""
+    import ezdxf
+    from ezdxf.disassemble import recursive_decompose
+    from ezdxf.path import make_path
+
+    paths = []
+    for entity in recursive_decompose(ezdxf.readfile(path).modelspace()):  # type: ignore[attr-defined]
+        if entity.dxftype() in ("LINE", "LWPOLYLINE", "POLYLINE", "CIRCLE", "ARC", "ELLIPSE", "SPLINE", "HATCH"):
+            paths += [part for part in make_path(entity).sub_paths() if len(part)]
+    if not paths:
+        raise Refused("the drawing contains no lines", "convert text to lines first")
+    corners = np.array([tuple(point) for part in paths for point in part.control_vertices()])[:, :2]
+    step = sag * max(float(np.ptp(corners, axis=0).max()), float(np.finfo(np.float64).tiny))
+    lines = [np.array([tuple(point) for point in part.flattening(step)])[:, :2] for part in paths]
+    return {"points": np.concatenate(lines), "counts": np.array([len(line) for line in lines], dtype=np.int64)}
+
+
 def confine(memory: int, seconds: int) -> None:
     """Limit memory and processor time of this process, and deny it network and other programs.
 

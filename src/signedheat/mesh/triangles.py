@@ -138,7 +138,10 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
 
 
 def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:
-    """Return (k − 2, 3) ears of a simple polygon, counter-clockwise around a normal, best first, or (0, 3)."""
+    """Return (k − 2, 3) ears of a polygon, counter-clockwise around a normal, best first, or (0, 3).
+
+    The polygon is simple, or passes an edge there and back, as round a hole that a cut joins to its outline.
+    """
     upright = np.eye(3)[np.abs(normal).argmin()]
     first = np.cross(upright, normal)
     second = np.cross(normal, first)
@@ -157,7 +160,15 @@ def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int],
         inside = np.ones((len(left), len(left)), dtype=bool)  # [point, ear]
         for u, v in ((a, b), (b, c), (c, a)):
             inside &= (np.conj(v - u) * (z - u)).imag >= 0
-        inside &= (left[:, None] != before) & (left[:, None] != left) & (left[:, None] != after)
+        others = (left[:, None] != before) & (left[:, None] != left) & (left[:, None] != after)
+        inside &= others & (z != a) & (z != b) & (z != c)
+        if len(np.unique(plane[left])) < len(left):
+            for u, v, w in ((a, b, c), (b, c, a), (c, a, b)):  # what begins at another corner in the same place as v
+                for step in (plane[after][:, None] - z, plane[before][:, None] - z):
+                    least = AREA_ROUNDING * np.abs(step)
+                    goes_in = (np.conj(w - v) * step).imag > least * np.abs(w - v)
+                    goes_in &= (np.conj(step) * (u - v)).imag > least * np.abs(u - v)
+                    inside |= others & (z == v) & goes_in
         quality = np.where(inside.any(axis=0), -1.0, area / np.where(size > 0, size, 1.0))
         ears = np.argsort(-quality, kind="stable")
         fitting = (k for k in ears[quality[ears] > 0] if allowed is None or allowed(int(before[k]), int(after[k])))

@@ -218,6 +218,10 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
     total = sums_of(whole, fan_of, len(fans))
     part = (whole * total[fan_of]).sum(axis=1)
     turned = mask_of(len(fans), fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]])
+    # what passes a corner twice goes round a hole, which a fan would fill
+    order = np.lexsort((tails, fan_of))
+    again = (np.diff(tails[order]) == 0) & (np.diff(fan_of[order]) == 0)
+    turned |= mask_of(len(fans), fan_of[order][1:][again])
     cuts = {k: _cut(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
     cuts = {k: triangles for k, triangles in cuts.items() if len(triangles)}
     kept = np.ones(len(fans), dtype=bool)

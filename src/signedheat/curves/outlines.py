@@ -1,0 +1,115 @@
+"""Outlines in the plane: lines that go on in each other until they close, and what closed outlines fill."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import scipy
+
+from ..arrays import Floats, Ints
+from ..diagnostics import Note
+from ..grids.polyline import Polyline
+from ..mesh.polylines import FillRule, assemble_polylines, filled_outlines
+from ..mesh.triangles import AREA_ROUNDING
+from ..mesh.welding import ONE_PLACE
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class OutlinesFilled(Note):
+    """How closed outlines were filled: by which rule, how many, and which share of their length lies inside."""
+
+    rule: str
+    outlines: int
+    length_inside: float
+    text: ClassVar[str] = (
+        "closed outlines: {0.outlines}, filled by the rule {0.rule}; {0.length_inside:%} of their length lies inside"
+    )
+
+    @property
+    def important(self) -> bool:
+        return self.length_inside > AREA_ROUNDING
+
+
+def outlines_filled(
+    lines: Sequence[Polyline], rule: FillRule, narrow: float
+) -> tuple[list[Polyline], list[int], OutlinesFilled | None]:
+    """Return the outlines of what closed lines fill, then lines that are not closed; and a note if any are filled.
+
+    Also return numbers to name these by: open lines keep theirs, and outlines have those of closed lines, in order, or
+    higher ones if there are more of them. Lines that close together (`closed_together`) count as one closed line.
+    """
+    outlines = {k: line for k, line in enumerate(lines) if line.closed}
+    strokes = distinct({k: line for k, line in enumerate(lines) if not line.closed})
+    for members, outline in closed_together(strokes, narrow):
+        outlines[min(members)] = outline
+        strokes = {k: line for k, line in strokes.items() if k not in members}
+    numbers = sorted(outlines)
+    filled = [Polyline(points, closed=True) for points in filled_outlines([outlines[k].points for k in numbers], rule)]
+    if not filled:
+        return list(lines), list(range(len(lines))), None
+    given, left = sum(line.length for line in outlines.values()), sum(line.length for line in filled)
+    note = OutlinesFilled(rule, len(outlines), max(0.0, 1.0 - left / given))
+    numbers = [*numbers, *range(len(lines), len(lines) + len(filled))][: len(filled)]
+    return [*filled, *strokes.values()], [*numbers, *strokes], note
+
+
+def distinct(strokes: dict[int, Polyline]) -> dict[int, Polyline]:
+    """Return strokes without copies of others, which run either way."""
+    first: dict[bytes, int] = {}
+    for k, line in strokes.items():
+        first.setdefault(min((line.points + 0.0).tobytes(), (line.points[::-1] + 0.0).tobytes()), k)
+    return {k: strokes[k] for k in sorted(first.values())}
+
+
+def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[tuple[list[int], Polyline]]:
+    """Return the outlines that open lines make where they go on in each other, whichever way each of them runs.
+
+    Two lines go on in each other if no third one ends there, and their ends differ by rounding, or by less than
+    `narrow`, relative to the length of the shorter one. An outline runs as most of its length does, or, if half runs
+    either way, counter-clockwise. What is not wider than the gaps in it is no outline, but a line drawn twice. Each
+    outline comes with the numbers of its lines.
+    """
+    numbers, lines = list(strokes), list(strokes.values())
+    if not lines:
+        return []
+    ends = np.concatenate([line.points[[0, -1]] for line in lines])
+    lengths = np.repeat([line.length for line in lines], 2)
+    rounding = ONE_PLACE * np.spacing(np.abs(ends).max(axis=1))
+    partner, gaps = partners(ends, np.maximum(rounding, narrow * lengths))
+    node = np.minimum(np.arange(len(ends)), partner)
+    outlines = []
+    for chain, backwards, closed in assemble_polylines(node[::2], node[1::2], directed=False):
+        if not closed:
+            continue
+        parts = [lines[k].points[:: -1 if back else 1] for k, back in zip(chain, backwards, strict=True)]
+        widest = float(gaps[np.concatenate([2 * chain, 2 * chain + 1])].max())
+        outline = Polyline(np.concatenate(parts), closed=True)
+        against = float((np.array([lines[k].length for k in chain]) * np.where(backwards, 1, -1)).sum())
+        is_tie = abs(against) <= AREA_ROUNDING * outline.length
+        if outline.signed_area < 0 if is_tie else against > 0:
+            outline = outline.reversed()
+        filled = filled_outlines([outline.points], "nonzero")
+        area = sum(abs(Polyline(points, closed=True).signed_area) for points in filled)
+        if area > outline.length * max(widest, AREA_ROUNDING * outline.length):
+            outlines.append(([numbers[k] for k in chain], outline))
+    return outlines
+
+
+def partners(ends: Floats, room: Floats) -> tuple[Ints, Floats]:
+    """Return (n,) the end that each of (n, 2) ends of lines meets, itself if none or several, and how far away it is.
+
+    Ends meet that are nearer to each other than the `room` (n,) of both of them.
+    """
+    n = len(ends)
+    distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(3, n))
+    others = np.where(near == np.arange(n)[:, None], np.inf, distances)
+    if n > 2:  # at a place of several ends, an end itself may not be among the first
+        others[~np.isinf(others).any(axis=1), 2] = np.inf
+    meets = others <= np.minimum(room[:, None], room[near])
+    first = np.where(meets.sum(axis=1) == 1, near[np.arange(n), meets.argmax(axis=1)], np.arange(n))
+    mutual = first[first] == np.arange(n)
+    partner = np.where(mutual, first, np.arange(n))
+    return partner, np.linalg.norm(ends - ends[partner], axis=1)

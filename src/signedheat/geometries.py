@@ -1,0 +1,121 @@
+"""Geometries of shapely, GeoPandas and GeoJSON as polylines in the plane, and polylines as geometries of shapely."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import reduce
+from typing import Any, Protocol, cast
+
+import numpy as np
+
+from .errors import GeometryError, UnsupportedTypeError
+from .grids.polyline import Polyline
+from .packages import lazy_module
+
+shapely: Any = lazy_module("shapely", "geometries of shapely")
+
+
+class HasGeoInterface(Protocol):
+    """A geometry of shapely or GeoPandas, seen by a type checker."""
+
+    @property
+    def __geo_interface__(self) -> object: ...
+
+
+def geometry_of(thing: object) -> Mapping[str, Any] | None:
+    """Return GeoJSON for what is a geometry: a mapping of that kind, or an object with ``__geo_interface__``."""
+    found = getattr(thing, "__geo_interface__", thing)
+    return found if isinstance(found, Mapping) and isinstance(found.get("type"), str) else None
+
+
+def polylines_of(geometry: Mapping[str, Any]) -> list[Polyline]:
+    """Return the lines of a geometry of GeoJSON, and the rings of its polygons, holes opposite to their outlines.
+
+    Coordinates beyond the second are left out.
+
+    Raises
+    ------
+    UnsupportedTypeError
+        If it holds points, or a type that GeoJSON does not know.
+    GeometryError
+        If it holds no line, or coordinates are none.
+    """
+    lines = list(_lines(geometry))
+    if not lines:
+        raise GeometryError("the geometry is empty", remedy="leave it out", element=geometry["type"])
+    return lines
+
+
+def _lines(geometry: Mapping[str, Any]) -> Iterator[Polyline]:
+    kind, coordinates = str(geometry.get("type")), geometry.get("coordinates") or ()
+    if kind == "Feature":
+        if geometry.get("geometry"):
+            yield from _lines(geometry["geometry"])
+    elif kind in ("FeatureCollection", "GeometryCollection"):
+        for part in geometry.get("features" if kind == "FeatureCollection" else "geometries") or ():
+            yield from _lines(part)
+    elif kind in ("LineString", "LinearRing", "MultiLineString"):
+        for points in (coordinates if kind == "MultiLineString" else [coordinates]) if coordinates else ():
+            yield _polyline(points, kind == "LinearRing")
+    elif kind in ("Polygon", "MultiPolygon"):
+        for rings in (coordinates if kind == "MultiPolygon" else [coordinates]) if coordinates else ():
+            for number, points in enumerate(rings):
+                line = _polyline(points, True)
+                yield line.reversed() if (line.signed_area > 0) == (number == 0) else line
+    else:
+        raise UnsupportedTypeError(
+            f"a {kind} has no lines", remedy="pass lines and polygons; for points use sh.PointCloud", element=kind
+        )
+
+
+def _polyline(points: Any, closed: bool) -> Polyline:
+    try:
+        places = np.array([[float(x) for x in point[:2]] for point in points], dtype=np.float64)
+    except (TypeError, ValueError, LookupError) as error:
+        raise GeometryError(f"coordinates of a geometry must be pairs of numbers ({error})") from error
+    return Polyline(places, closed or (len(places) > 2 and bool((places[0] == places[-1]).all())))
+
+
+def to_shapely(lines: Polyline | Sequence[Polyline]) -> HasGeoInterface:
+    """Convert polylines in the plane, such as offsets, to a geometry of shapely.
+
+    Parameters
+    ----------
+    lines : Polyline or sequence of Polyline
+        Closed ones become polygons: what lies within an odd number of them is inside, so that outlines in others are
+        their holes. Open ones become lines.
+
+    Returns
+    -------
+    shapely.Polygon, MultiPolygon, LineString, MultiLineString or GeometryCollection
+        What fits.
+
+    Raises
+    ------
+    MissingPackageError
+        If shapely is not installed.
+
+    See Also
+    --------
+    signedheat.signed_distance : Takes geometries of shapely and GeoJSON in place of polylines.
+
+    Examples
+    --------
+    >>> square = Polyline([[0, 0], [4, 0], [4, 4], [0, 4]], closed=True)
+    >>> hole = Polyline([[1, 1], [2, 1], [2, 2], [1, 2]], closed=True)
+    >>> to_shapely([square, hole]).__geo_interface__["type"]
+    'Polygon'
+    """
+    listed = [lines] if isinstance(lines, Polyline) else list(lines)
+    areas = [shapely.make_valid(shapely.Polygon(line.points)) for line in listed if line.closed and line.n_points > 2]
+    parts = [reduce(shapely.symmetric_difference, areas)] if areas else []
+    open_lines = [
+        shapely.LineString(line.segments[:, 0] if line.closed else line.points)
+        for line in listed
+        if not line.closed or line.n_points < 3
+    ]
+    if len(open_lines) == 1:
+        parts += open_lines
+    elif open_lines:
+        parts.append(shapely.MultiLineString(open_lines))
+    return cast("HasGeoInterface", parts[0] if len(parts) == 1 else shapely.GeometryCollection(parts))

@@ -1,0 +1,108 @@
+"""A triangle mesh without copies of faces and faces between two vertices, whose faces agree; and the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ..arrays import Ints
+from ..diagnostics import Note
+from ..mesh.edges import orient_faces, pair_halfedges
+from ..mesh.welding import coincident_faces
+from .surface_curves import Curve, SurfacePoints
+from .surface_discretization import vertices_joined
+from .triangle_mesh import TriangleMesh
+from .vertex_field import VertexField
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshRepaired(Note):
+    """What was done to a mesh for distance on it: faces flipped, copies left out."""
+
+    faces_turned: int
+    copies: int
+    text: ClassVar[str] = "faces flipped: {0.faces_turned}; copies of faces: {0.copies}"
+
+
+@dataclass(frozen=True, eq=False)
+class RepairedMesh:
+    """A mesh with its seams joined and without copies of faces, which agree with their neighbours where they can."""
+
+    given: TriangleMesh  # the mesh before the repair
+    mesh: Any  # the mesh after it, a `TriangleMesh` on some of the same vertices
+    places: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
+    faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
+    corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
+    notes: tuple[Note, ...]  # what was done
+
+    @classmethod
+    def of(cls, given: object, agree: bool = True) -> RepairedMesh | None:
+        """Return a repaired triangle mesh; None if there is nothing to repair, or the shape given is none.
+
+        Faces are turned only if they are to `agree`.
+        """
+        if not isinstance(given, TriangleMesh):
+            return None
+        n, kept = given.n_vertices, np.unique(copied_faces(given.faces, given.n_vertices))
+        # beside a copy of its face, a rim looks like an edge of two faces
+        once = given if len(kept) == given.n_faces else TriangleMesh(given.vertices, given.faces[kept])
+        corners = once.places[given.faces]
+        kept, targets = np.unique(copied_faces(corners, n), return_inverse=True)
+        faces, areas = corners[kept], given.face_areas[kept]
+        turned = orient_faces(faces, areas, n).turned if agree else np.zeros(len(faces), dtype=bool)
+        copies = given.n_faces - len(kept)
+        if not (copies or turned.any()):
+            return None
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
+        to = (corners[:, :, None] == faces[targets][:, None]).argmax(axis=2)
+        notes = *vertices_joined(once), MeshRepaired(int(turned.sum()), copies)
+        return cls(given, TriangleMesh(given.vertices, faces), once.places, targets, to, notes)
+
+    def on_it(self, source: Any) -> Any:
+        """Move a curve, points, or a sequence of them to the repaired mesh; what does not fit the given one stays."""
+        if isinstance(source, Sequence) and not isinstance(source, str):
+            return [self.on_it(part) for part in source]
+        if not isinstance(source, Curve | SurfacePoints):
+            return source
+        faces = source.faces
+        if not ((faces >= 0) & (faces < len(self.faces))).all():
+            return source
+        weights = np.zeros((len(faces), 3))
+        np.add.at(weights, (np.arange(len(faces))[:, None], self.corners[faces]), source.barycentric)
+        if isinstance(source, SurfacePoints):
+            return SurfacePoints(self.faces[faces], weights)
+        return Curve(self.faces[faces], weights, source.closed, source.oriented, source.normals)
+
+    def on_given(self, field: VertexField[Any]) -> VertexField[Any]:
+        """Return a field on the repaired mesh, at the vertices of the given one."""
+        values = field.values[self.places]
+        diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(*self.notes)
+        return VertexField(self.given, values, diagnostics)
+
+    def curve_on_given(self, curve: Curve) -> Curve:
+        """Return a curve on the repaired mesh as one on the given mesh; of copies of a face, it is on the first."""
+        faces = np.unique(self.faces, return_index=True)[1][curve.faces]
+        weights = np.take_along_axis(curve.barycentric, self.corners[faces], axis=1)
+        return Curve(faces, weights, curve.closed, curve.oriented, curve.normals)
+
+
+def copied_faces(faces: Ints, n_vertices: int) -> Ints:
+    """(m,) first face on the vertices of each face with an edge of more than two faces; elsewhere the face itself.
+
+    For a face that has a vertex twice, and so no area, it is one with the same vertices, if there is one.
+    """
+    first = np.arange(len(faces))
+    doubled = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
+    crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
+    if len(crowded):
+        copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
+        first[crowded] = np.where(copies < 0, crowded, crowded[copies])
+    for face in np.flatnonzero(doubled).tolist():
+        around = np.flatnonzero(np.isin(faces, faces[face]).sum(axis=1) >= len(set(faces[face].tolist())))
+        others = around[~doubled[around]]
+        first[face] = first[others[0]] if len(others) else face
+    return first
