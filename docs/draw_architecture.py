@@ -20,7 +20,7 @@ FLOORS = [
     ("surfaces   grids   tets", "slices: domain, operators, sources, discretisation, sharpening, field", "#d3e8ea"),
     (
         (
-            "area_elements field_arithmetic field_kinds field_levels foreign inspection kinds "
+            "area_elements field_arithmetic field_kinds field_levels foreign geometries inspection kinds "
             "sharpening_methods transforms"
         ),
         "one function for all slices, by type",

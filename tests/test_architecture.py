@@ -41,6 +41,7 @@ FLOORS = [
         "field_kinds",
         "field_levels",
         "foreign",
+        "geometries",
         "inspection",
         "kinds",
         "sharpening_methods",

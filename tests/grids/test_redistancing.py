@@ -180,3 +180,13 @@ def test_periodic_arrays_are_like_repeated_ones(shape):
     found = sh.redistance(values, steps, periodic=True)
     np.testing.assert_allclose(found, middle, atol=0.05 * steps.min())
     assert np.mean(np.abs(found - middle) < 1e-9) > 0.99
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float64])
+def test_masks_of_zeros_and_ones_have_no_sign(dtype):
+    mask = np.zeros((9, 9), dtype=dtype)
+    mask[3:6, 3:7] = 1
+    with pytest.raises(sh.errors.GeometryError) as caught:
+        sh.redistance(mask)
+    assert caught.value.element == "values" and "where" in caught.value.remedy
+    assert sh.redistance(np.where(mask == 1, -1.0, 1.0))[4, 4] < 0

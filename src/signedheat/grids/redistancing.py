@@ -100,9 +100,10 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
             f"periodic must be one or {given.ndim} of True and False, not {periodic!r}", element="periodic"
         )
     steps, again = positive_steps(spacing, given.ndim), [flag(value, "periodic") for value in flags]
-    if ((given == 0) | (given == 1)).all() and 0 < np.count_nonzero(given) < given.size:
+    zeros = given == 0
+    if (zeros | (given == 1)).all() and not zeros.all() and scipy.ndimage.binary_erosion(zeros).any():
         raise GeometryError(
-            "values of 0 and 1 alone are a mask, which has no sign",
+            "values of 0 and 1 alone, 0 in a whole region, are a mask, which has no sign",
             remedy="pass numpy.where(mask == 1, -1.0, 1.0)",
             element="values",
         )
