@@ -74,7 +74,7 @@ def cone_volumes(triangles: Floats, counts: Ints, groups: Ints, n: int) -> Float
     centres = sums_of(middles * areas[:, None], groups, n)
     centres /= np.maximum(np.bincount(groups, areas, n), np.finfo(float).tiny)[:, None]
     heights = ((middles - centres[groups]) * area_vectors(triangles)).sum(axis=1)
-    return np.bincount(groups, counts * heights / 3.0, n)
+    return np.bincount(groups, counts * heights / 3.0, n).astype(np.float64)
 
 
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:

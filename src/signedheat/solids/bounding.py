@@ -87,8 +87,8 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     parts = np.where(loose, -1, chain.complexes)[first_members(given.pieces, len(given.orientable))[names]]
     parts = np.unique(parts, return_inverse=True)[1]
     part_of = np.where(whole, -1, parts[pieces])
-    areas = np.bincount(pieces[~whole], chain.areas[~whole])
-    part_areas = np.bincount(parts, areas)
+    areas = np.bincount(pieces[~whole], chain.areas[~whole]).astype(np.float64)
+    part_areas = np.bincount(parts, areas).astype(np.float64)
 
     def missing_of(decided: Bounding) -> Floats:
         """Share of the area of each part that is unexplained."""

@@ -234,8 +234,8 @@ def completed(
             solid = run(partial(_from_points, cloud, method))
     else:
         with stopwatch("orient") as run:
-            triangles, parts = divided_at_rims(joined.triangulation)
-            owners = owners_of(joined)[parts]
+            triangles, cut_from = divided_at_rims(joined.triangulation)
+            owners = owners_of(joined)[cut_from]
             chain = run(lambda: Chain.of(triangles))
             decided = bounding(chain, options.nested, options.as_oriented)
             notes = [] if options.as_oriented else [oriented_as(joined, owners, chain, decided).note]
@@ -247,9 +247,9 @@ def completed(
             solid = _with_whole_boundary(solid, triangles)
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
-    for note in solid.diagnostics.notes if not isinstance(joined, PointCloud) else ():
-        if isinstance(note, CompletedArea) and note.completed_share > MOSTLY_GIVEN:
-            warn_user(f"{note}: where so much is missing, the result is a guess", InexactWarning)
+    completed = [each for each in solid.diagnostics.notes if isinstance(each, CompletedArea)]
+    if completed and completed[0].completed_share > MOSTLY_GIVEN and not isinstance(joined, PointCloud):
+        warn_user(f"{completed[0]}: where so much is missing, the result is a guess", InexactWarning)
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
 

@@ -31,8 +31,8 @@ def without_strays(cloud: PointCloud) -> tuple[PointCloud, list[StrayPoints]]:
     strays = (gaps > STRAY_DISTANCE * np.median(gaps[near[:, 1:]], axis=1))[owners.ravel()]
     if not strays.any():
         return cloud, []
-    kept = [None if each is None else each[~strays] for each in (cloud.normals, cloud.areas)]
-    return PointCloud(cloud.points[~strays], *kept, cloud.n_neighbors), [StrayPoints(int(strays.sum()))]
+    normals, areas = (None if each is None else each[~strays] for each in (cloud.normals, cloud.areas))
+    return PointCloud(cloud.points[~strays], normals, areas, cloud.n_neighbors), [StrayPoints(int(strays.sum()))]
 
 
 def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
