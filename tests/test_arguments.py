@@ -71,6 +71,7 @@ REPORTING = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:the region depends")  # the open curve closes by a guess
 @pytest.mark.parametrize("name", REPORTING)
 def test_progress_is_called_or_refused(name):
     seen = []

@@ -59,7 +59,7 @@ Solid = TypeVar("Solid", bound=SolidField)
 
 def _finite(number: Number) -> float:
     """Return a number as a float; refuse NaN and infinity, which would leave no distance."""
-    return finite_number(number, "a number that a field is combined with")
+    return finite_number(number, "number")
 
 
 class Arithmetic:

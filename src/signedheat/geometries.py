@@ -72,7 +72,9 @@ def _polyline(points: Any, closed: bool) -> Polyline:
     try:
         places = np.array([[float(x) for x in point[:2]] for point in points], dtype=np.float64)
     except (TypeError, ValueError, LookupError) as error:
-        raise GeometryError(f"coordinates of a geometry must be pairs of numbers ({error})") from error
+        raise GeometryError(
+            f"coordinates of a geometry must be pairs of numbers ({error})", element="coordinates"
+        ) from error
     return Polyline(places, closed or (len(places) > 2 and bool((places[0] == places[-1]).all())))
 
 
@@ -97,7 +99,7 @@ def to_shapely(lines: Polyline | Sequence[Polyline]) -> HasGeoInterface:
 
     See Also
     --------
-    signedheat.signed_distance : Takes geometries of shapely and GeoJSON in place of polylines.
+    signed_distance : Takes geometries of shapely and GeoJSON in place of polylines.
 
     Examples
     --------

@@ -16,7 +16,7 @@ import signedheat as sh
 from signedheat import samples
 from signedheat.cli import main, reports
 from signedheat.cli.options import PLANAR
-from signedheat.io import POLYLINE_FORMATS
+from signedheat.io.drawing_files import POLYLINE_READERS
 
 COMMAND = [sys.executable, "-m", "signedheat"]
 
@@ -54,7 +54,7 @@ def test_help_and_bad_usage_come_before_anything_is_imported(arguments):
 
 
 def test_usage_knows_the_formats_of_polylines():
-    assert set(PLANAR) == POLYLINE_FORMATS
+    assert set(PLANAR) == set(POLYLINE_READERS)
 
 
 def test_output_that_cannot_hold_the_text(ball, tmp_path):

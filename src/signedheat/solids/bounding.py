@@ -30,7 +30,7 @@ from .rims import meeting_edges, open_edges
 
 LEAST_GAIN = 0.1
 """Another reading must explain more than that as given, by this share of the area that counts in another way."""
-EXPLAINED = 1e-3
+WELL_EXPLAINED = 1e-3
 """A part of which less than this share is unexplained is taken as given: winding numbers are as inexact as that."""
 MOSTLY_WRONG = 0.5
 """A part of which more than this share is unexplained may be turned as a whole, or be a cavity of what is around it."""
@@ -113,9 +113,9 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     differ = np.bincount(part_of[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
     every, as_cavities = np.ones(len(missing), dtype=bool), "cavities" if nested == "given" else nested
     trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
-        (by_odd, differ, EXPLAINED, True, nested),
-        (by_once, every, EXPLAINED, True, nested),
-        (by_once, every, EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
+        (by_odd, differ, WELL_EXPLAINED, True, nested),
+        (by_once, every, WELL_EXPLAINED, True, nested),
+        (by_once, every, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
         (by_once, every, MOSTLY_WRONG, True, as_cavities),
     )
     overlapping = False

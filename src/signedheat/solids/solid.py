@@ -420,6 +420,8 @@ class Solid(Displayed, Represented, Frozen):
             return simplified(whole, within)
         if level is None and spacing is None and resolution is None and not smooth:
             kept = kept_surface(self, progress)
+            if progress is not None:
+                progress(1.0, "done")
             if kept.note:
                 warn_user(kept.note, InexactWarning)
             return kept.mesh

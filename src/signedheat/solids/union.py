@@ -56,9 +56,9 @@ def united(
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
-    points, faces = _connected(whole)
-    slacks = tolerances(points, faces, SAME_POINT)
-    pieces, regions = cut_and_sided(partial(_cut, points, faces, closing), slacks, closing, windings)
+    places, faces = _connected(whole)
+    slacks = tolerances(places, faces, SAME_POINT)
+    pieces, regions = cut_and_sided(partial(_cut, places, faces, closing), slacks, closing, windings)
     uncut = np.array_equal(pieces.origins, np.arange(len(whole.triangles)))
     triangles = whole.triangles if uncut else pieces.points[pieces.faces]
     behind, ahead = regions.behind.copy(), regions.ahead.copy()
