@@ -1,0 +1,216 @@
+"""What is right as it is given stays so: a shape and the same shape changed a little bound the same solid."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from shapes.bodies import finer
+from signedheat import samples
+from signedheat.errors import InexactWarning
+
+SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
+"""Corners of the sides of a box: −z, z, −y, y, −x, x; corner 4 k + 2 j + i is at (i, j, k)."""
+
+
+def box(low, high, without=(), diagonal=0):
+    corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+    quads = np.roll(SIDES[[k for k in range(6) if k not in without]], diagonal, axis=1)
+    return np.where(corners, high, low).astype(float), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def joined(*meshes):
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    return (
+        np.concatenate([vertices for vertices, _ in meshes]),
+        np.concatenate([faces + start for (_, faces), start in zip(meshes, starts[:-1], strict=True)]),
+    )
+
+
+def bricks(*counts, diagonals=lambda corner: 0):
+    return joined(*[box(corner, np.add(corner, 1), diagonal=diagonals(corner)) for corner in np.ndindex(*counts)])
+
+
+def ball(level=3, radius=1.0, center=(0, 0, 0)):
+    mesh = samples.sphere(level, radius=radius, center=center)
+    return np.array(mesh.vertices), np.array(mesh.faces)
+
+
+def below(mesh, height):
+    vertices, faces = mesh
+    return vertices, faces[vertices[faces].mean(axis=1)[:, 2] < height]
+
+
+def turned(mesh, which):
+    faces = mesh[1].copy()
+    faces[which] = faces[which][:, ::-1]
+    return mesh[0], faces
+
+
+def volume(mesh, **options):
+    return sh.complete(mesh, **options).volume
+
+
+@pytest.mark.parametrize("diagonals", [lambda corner: 0, lambda corner: sum(corner) % 2], ids=["alike", "crossed"])
+def test_bricks_that_touch_stay_bricks_without_any_one_triangle(diagonals):
+    """Whichever way their sides are divided, so that walls between them are there twice, or as other triangles."""
+    vertices, faces = bricks(2, 2, 1, diagonals=diagonals)
+    for gone in range(0, len(faces), 5):
+        assert volume((vertices, np.delete(faces, gone, axis=0))) == pytest.approx(4.0, rel=0.005)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_bricks_that_touch_stay_bricks_whichever_way_their_triangles_run(share):
+    mesh = bricks(2, 2, 1, diagonals=lambda corner: sum(corner) % 2)
+    which = np.random.default_rng(3).random(len(mesh[1])) < share
+    assert volume(turned(mesh, which)) == pytest.approx(4.0)
+
+
+def test_halves_of_a_body_that_touch_are_the_body():
+    halves = joined(box((0, 0, 0), (1, 1, 1)), finer(*box((1, 0, 0), (2, 1, 1))))
+    assert volume(halves) == pytest.approx(2.0)
+    assert volume((halves[0], np.delete(halves[1], 3, axis=0))) == pytest.approx(2.0, rel=0.005)
+
+
+OPEN = {"box": finer(*box((0, 0, 0), (2, 1, 0.7), without=(1,))), "half a ball": below(ball(2), 0.05)}
+
+
+@pytest.mark.parametrize("name", OPEN)
+@pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-9, 1e-7, 1e-6, 1e-3])
+def test_an_open_body_given_twice_is_one_body(name, noise):
+    vertices, faces = OPEN[name]
+    moved = vertices + noise * np.random.default_rng(0).normal(size=vertices.shape)
+    once, twice = sh.complete((vertices, faces)), sh.complete(joined((vertices, faces), (moved, faces)))
+    assert twice.volume == pytest.approx(once.volume, rel=0.01 + 10 * noise)
+    assert twice.inside([[0.5, 0.3, 0.0 if name == "half a ball" else 0.3]]).all()
+
+
+@pytest.mark.parametrize("move", [1e-9, 1e-7, 1e-5])
+def test_a_closed_body_given_twice_is_one_body(move):
+    vertices, faces = box((0, 0, 0), (2, 1, 0.7))
+    twice = joined((vertices, faces), (vertices + move * np.array([1, 0.3, -0.5]), faces))
+    assert volume(twice) == pytest.approx(1.4, rel=10 * move + 1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.002, 0.01, 0.04])
+def test_panels_with_gaps_between_them_are_the_body(gap):
+    """Octants of an ellipsoid, moved apart; each has the vertices of its own."""
+    axes, whole = np.array([2.0, 0.9, 0.6]), ball(4)
+    panels, middles = [], whole[0][whole[1]].mean(axis=1)
+    for signs in 1 - 2 * np.array(list(np.ndindex(2, 2, 2))):
+        kept = (middles * signs > 0).all(axis=1)
+        panels.append((axes * whole[0] + gap / 2 * signs, whole[1][kept]))
+    solid = sh.complete(joined(*panels))
+    assert solid.volume == pytest.approx(4 / 3 * np.pi * axes.prod(), rel=0.01 + 3 * gap)
+    assert solid.inside([[0, 0, 0], [0.5, 0.3, 0.2], [-1.5, 0, 0]]).all() and not solid.inside([[2.2, 0, 0]])[0]
+
+
+@pytest.mark.parametrize("distance", [1e4, 1e7, 1e9, 1e12])
+def test_bodies_far_apart_do_not_know_of_each_other(distance):
+    first, second = ball(2), ball(2, center=(distance, 0, 0))
+    own = samples.sphere(2).volume
+    solid = sh.complete(joined(first, second))
+    assert solid.inside([[0, 0, 0], [distance, 0, 0]]).all() and not solid.inside([[0, 0, 1.5]])[0]
+    assert solid.distance([[0.0, 0, 0]])[0] == pytest.approx(sh.complete(first).distance([[0.0, 0, 0]])[0], rel=1e-9)
+    near = sh.complete(first)
+    assert len(solid.triangles) == len(first[1]) + len(second[1]) and near.volume == pytest.approx(own)
+
+
+@pytest.mark.parametrize("reach", [1e3, 1e7, 1e10])
+def test_a_face_that_reaches_far_away_changes_nothing_near_by(reach):
+    vertices, faces = ball(2)
+    spike = np.concatenate([vertices, [[reach, 0, 0]]]), np.concatenate([faces, [[0, 1, len(vertices)]]])
+    assert sh.complete(spike).distance([[0.0, 0, 0]])[0] == pytest.approx(-0.98, abs=0.02)
+
+
+@pytest.mark.parametrize("place", [1e3, 1e6, 1e9, 1e12])
+def test_a_body_far_from_the_origin_is_as_exact_as_its_coordinates(place):
+    vertices, faces = ball(2)
+    moved = vertices + place * np.array([0.6, -0.64, 0.48])
+    assert volume((moved, faces)) == pytest.approx(samples.sphere(2).volume, rel=1e-9 + 2**-48 * place)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+def test_walls_that_end_in_the_middle_of_a_roof_make_no_eaves(share):
+    """The roof's faces have no vertices at the walls: what reaches beyond these bounds nothing."""
+    walls = box((0, 0, 0), (2, 3, 1), without=(1,))
+    roof = np.array([[-0.5, -0.5, 1], [2.5, -0.5, 1], [2.5, 3.5, 1], [-0.5, 3.5, 1]]), np.array([[0, 1, 2], [0, 2, 3]])
+    mesh = joined(walls, roof)
+    solid = sh.complete(turned(mesh, np.random.default_rng(1).random(len(mesh[1])) < share))
+    assert solid.volume == pytest.approx(6.0)
+    assert solid.distance([[-0.4, 1, 0.9], [-0.4, 1, 1.1]]) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("inner", [False, True])
+@pytest.mark.parametrize("outer", [False, True])
+def test_a_low_tray_of_two_skins_is_hollow_whichever_way_they_face(inner, outer):
+    skins = box((0, 0, 0), (150, 100, 25), without=(0,)), box((2, 2, 0), (148, 98, 23), without=(0,))
+    mesh = joined(turned(skins[0], slice(None) if outer else []), turned(skins[1], [] if inner else slice(None)))
+    assert volume(mesh) == pytest.approx(150 * 100 * 25 - 146 * 96 * 23)
+
+
+def test_a_thread_without_ends_is_closed_flat():
+    around, up = np.meshgrid(2 * np.pi * np.arange(48) / 48, np.linspace(0, 2, 41))
+    radius = 1 + 0.2 * np.abs((up / 0.5 - around / (2 * np.pi)) % 1 - 0.5)
+    points = np.stack([radius * np.cos(around), radius * np.sin(around), up], axis=-1)
+    ids = np.arange(points.size // 3).reshape(41, 48)
+    a, b, c, d = ids[:-1], np.roll(ids, -1, axis=1)[:-1], np.roll(ids, -1, axis=1)[1:], ids[1:]
+    faces = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)]).reshape(-1, 3)
+    mesh = points.reshape(-1, 3), faces
+    assert volume(mesh) == pytest.approx(volume(mesh, lids="flat"), rel=0.003)
+
+
+@pytest.mark.parametrize("level", [1, 2, 4])
+def test_flat_lids_on_jagged_rims_are_flat(level):
+    """As large as the fan of triangles from the middle of the rim."""
+    vertices, faces = ball(level)
+    kept = faces[vertices[faces].mean(axis=1)[:, 0] > 1e-9]
+    solid = sh.complete((vertices, kept), lids="flat")
+    edges = np.sort(np.stack([kept, np.roll(kept, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    edges, counts = np.unique(edges, axis=0, return_counts=True)
+    corners = vertices[kept] - vertices[np.unique(edges[counts == 1])].mean(axis=0)
+    cones = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert solid.volume == pytest.approx(cones, rel=0.02)
+
+
+def test_folded_cards_near_a_body_bound_nothing():
+    rng, parts = np.random.default_rng(5), [ball(3)]
+    for _ in range(60):
+        along = rng.normal(size=3)
+        along /= np.linalg.norm(along)
+        side = 0.04 * np.linalg.qr(np.stack([along, rng.normal(size=3)], axis=1))[0][:, 1]
+        fold = 7.5 * np.cross(along, side)
+        ends = (1.02 * along, 1.3 * along, 1.3 * along + fold)
+        corners = np.concatenate([[end - side, end + side] for end in ends])
+        parts.append((corners, np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]])))
+    assert volume(joined(*parts)) == pytest.approx(samples.sphere(3).volume, rel=1e-9)
+
+
+def test_vertices_in_the_middle_of_edges_change_no_lid():
+    vertices, faces = below(ball(3), 0.05)
+    some = np.random.default_rng(0).choice(len(faces), len(faces) // 8, replace=False)
+    corners = vertices[faces[some]]
+    a, b, c = faces[some].T
+    p, q, r = (len(vertices) + 3 * np.arange(len(some))[:, None] + np.arange(3)).T
+    rest = np.delete(faces, some, axis=0)
+    split = np.vstack([rest, np.c_[a, p, r], np.c_[p, b, q], np.c_[r, q, c], np.c_[p, q, r]])
+    middles = (corners + np.roll(corners, -1, axis=1)) / 2
+    assert volume((np.vstack([vertices, middles.reshape(-1, 3)]), split)) == pytest.approx(
+        volume((vertices, faces)), rel=0.01
+    )
+
+
+def test_where_most_is_missing_a_warning_says_so():
+    with pytest.warns(InexactWarning, match="is completed"):
+        sh.complete(below(ball(3), 0.0))
+
+
+@pytest.mark.parametrize("share", [0.01, 0.03])
+def test_stray_points_are_left_out_and_told(share):
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(4000, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    strays = rng.uniform(-2, 2, (int(share * 4000), 3))
+    solid = sh.complete(sh.PointCloud(np.concatenate([points, strays])))
+    assert solid.volume == pytest.approx(4 / 3 * np.pi, rel=0.02)
+    assert "stray points left out" in str(solid.diagnostics.notes[0])
+    assert not sh.complete(sh.PointCloud(points)).diagnostics.notes[0].as_dict().get("stray_points")
