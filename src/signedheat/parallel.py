@@ -13,7 +13,7 @@ from threading import Thread
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.spatial
+import scipy
 from numpy.typing import NDArray
 
 from .arrays import Floats
@@ -106,24 +106,31 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Ite
             thread.join()
 
 
-class PointTree(scipy.spatial.cKDTree):  # type: ignore[misc]  # SciPy has no types
+class PointTree:
     """SciPy's tree of points, with queries on threads of ours: SciPy's own crash after Ctrl-C.
 
     They use the tree after it has been freed.
     """
 
     def __init__(self, points: Floats, **options: Any) -> None:
-        if len(points) <= ROWS_PER_TASK:
-            super().__init__(points, **options)
-        else:
-            interruptible(super().__init__, points, **options)
+        make = scipy.spatial.cKDTree
+        few = len(points) <= ROWS_PER_TASK
+        self.tree: Any = make(points, **options) if few else interruptible(make, points, **options)
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what else SciPy's tree has."""
+        return getattr(self.tree, name)
+
+    def sparse_distance_matrix(self, other: PointTree, reach: float, **options: Any) -> Any:
+        """Return the distances up to `reach` between the points of two trees, as SciPy does."""
+        return self.tree.sparse_distance_matrix(other.tree, reach, **options)
 
     def query(self, x: Any, k: Any = 1, **options: Any) -> tuple[Any, Any]:
         """Return the distances and indices of the `k` nearest points of each row, as SciPy does."""
         rows = np.asarray(x, dtype=np.float64)
         if rows.ndim != 2 or len(rows) <= ROWS_PER_TASK:
-            return super().query(rows, k, **options)
-        search = partial(super().query, k=k, **options)
+            return self.tree.query(rows, k, **options)
+        search = partial(self.tree.query, k=k, **options)
         distances, indices = in_chunks(search, rows)
         return distances, indices
 
@@ -131,8 +138,8 @@ class PointTree(scipy.spatial.cKDTree):  # type: ignore[misc]  # SciPy has no ty
         """Return lists of the points within a radius of each row, as SciPy does."""
         rows = np.asarray(x, dtype=np.float64)
         if rows.ndim != 2 or len(rows) <= ROWS_PER_TASK:
-            return super().query_ball_point(rows, r, **options)
-        search, radii = super().query_ball_point, np.broadcast_to(np.asarray(r, dtype=np.float64), len(rows))
+            return self.tree.query_ball_point(rows, r, **options)
+        search, radii = self.tree.query_ball_point, np.broadcast_to(np.asarray(r, dtype=np.float64), len(rows))
         (near,) = in_chunks(lambda own: (search(rows[own], radii[own], **options),), np.arange(len(rows)))
         return near
 
