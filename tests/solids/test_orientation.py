@@ -341,9 +341,9 @@ def test_a_cell_that_all_walls_face_into_is_a_cavity_if_the_outside_faces_outwar
     outwards = np.einsum("ij,ij->i", centers, mesh.face_area_vectors) > 0
     given = turned(sh.TriangleMesh(mesh.vertices, mesh.faces[kept]), (room & (outwards == cavity))[kept])
     found = sh.orientation(given)
-    assert found.cavities == cavity
-    np.testing.assert_array_equal(found.inner, (partition if cavity else partition | room)[kept])
+    assert found.inner[partition[kept]].all() and not found.inner[bounding[kept]].any()
     assert found.turned_faces == 0
+    assert sh.complete(given).volume == pytest.approx(124.0 if cavity else 125.0)
 
 
 @pytest.mark.parametrize("gone", [0, 1, 2])
@@ -374,11 +374,13 @@ def test_a_fin_in_a_closed_body_is_inner_and_one_outside_is_not():
     assert not sh.orientation(outside).inner.any()
 
 
-def test_faces_on_each_other_make_no_complex():
-    """Where faces overlap around an edge, nobody knows which of them is next."""
-    mesh, bounding = walls_of_cells(np.ones((2, 1, 1), dtype=bool))
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_faces_on_each_other_with_other_diagonals_are_walls_too(share):
+    """A box stands on one of two cells that share a wall; its bottom and the cell's top are divided differently."""
+    mesh, _ = walls_of_cells(np.ones((2, 1, 1), dtype=bool))
     again = samples.union(mesh, box((0, 0, 1), (1, 1, 2)))
-    assert not sh.orientation(sh.TriangleMesh(again.vertices, again.faces)).inner[bounding.sum() :][-12:].any()
+    which = np.random.default_rng(0).random(again.n_faces) < share
+    assert sh.complete(turned(sh.TriangleMesh(again.vertices, again.faces), which)).volume == pytest.approx(3.0)
 
 
 def test_polygons_stay_polygons():
@@ -459,13 +461,15 @@ def test_the_note_tells_what_was_done(broken_duck):
 
 
 @pytest.mark.parametrize("thickness", [0.05, 0.035, 0.01])
-def test_walls_of_thin_shells_with_a_hole_face_away_from_each_other(thickness):
+@pytest.mark.parametrize("turn", [False, True])
+def test_walls_of_thin_shells_with_a_hole_face_away_from_each_other(thickness, turn):
     """Also where the walls are nearer to each other than the places at which levels are asked for."""
     ball = samples.sphere(4)
     outer = sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces].mean(axis=1)[:, 2] < 0.9])
-    inner = sh.TriangleMesh((1 - thickness) * outer.vertices, outer.faces)
-    found = sh.orientation(samples.union(outer, inner))
-    np.testing.assert_array_equal(found.turned, np.arange(2 * outer.n_faces) >= outer.n_faces)
+    inner = sh.TriangleMesh((1 - thickness) * outer.vertices, outer.faces[:, ::-1])
+    shell = samples.union(outer, inner)
+    found = sh.orientation(inverted(shell) if turn else shell)
+    np.testing.assert_array_equal(found.turned, turn)
     assert found.undecided_parts == 0
 
 

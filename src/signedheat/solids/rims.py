@@ -24,6 +24,8 @@ EDGE_PLACES = 8
 ALONG_EDGE = 0.1
 """Two edges run along each other within this distance, relative to the longer one. Chords of the same arc are less than
 0.05 apart if it has 16 or more."""
+MOST_ASKED = 1024
+"""Number of edges of rims that search for edges that run back, before their neighbours do."""
 SHARED_PLACES = 3
 """Number of places of one of two edges that lie along the other. Edges that only meet at a corner share fewer."""
 STRAIGHT_RIM = 1e-5
@@ -166,14 +168,22 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     Each place on an edge has one partner: the nearest place, direction included. The time is O(n log n).
     """
     ways, (places, owners) = unit(ends[:, 1] - ends[:, 0]), _places_on(ends)
-    partners = np.full(len(places), -1)
-    sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))[owners]
+    partners = np.full((len(ends), EDGE_PLACES), -1)
+    sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))
+    groups = np.arange(len(ends)) // (1 + len(ends) // MOST_ASKED)
+    firsts = np.append(True, groups[1:] != groups[:-1])[: len(ends)]
     for size in np.unique(sizes):
-        asking = np.flatnonzero(sizes == size)
+        # directions count so much that no edge finds its own neighbours
         tree = PointTree(np.concatenate([places / size, 2.0 * ways[owners]], axis=1))
-        back = np.concatenate([places[asking] / size, -2.0 * ways[owners[asking]]], axis=1)
-        near = tree.query(back, distance_upper_bound=2.0)[1]
-        partners[asking[near < len(places)]] = near[near < len(places)]
+        # a search that finds nothing takes long: where the first edge of a group finds nothing, no other one asks
+        for asking in (firsts, ~firsts):
+            met = (partners >= 0).any(axis=1)
+            edges = np.flatnonzero((sizes == size) & asking & (firsts | np.isin(groups, groups[met])))
+            rows = (EDGE_PLACES * edges[:, None] + np.arange(EDGE_PLACES)).ravel()
+            back = np.concatenate([places[rows] / size, -2.0 * ways[owners[rows]]], axis=1)
+            near = tree.query(back, distance_upper_bound=2.0)[1]
+            partners[edges] = np.where(near < len(places), near, -1).reshape(-1, EDGE_PLACES)
+    partners = partners.ravel()
     first = np.flatnonzero(partners >= 0)
     edge, other = owners[first], owners[partners[first]]
     away = places[first] - ends[other, 0]
