@@ -128,4 +128,6 @@ class Levels:
 @singledispatch
 def discretize(domain: Any) -> Discretization:
     """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
-    raise UnsupportedTypeError(f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {ACCEPTED_SHAPES}")
+    raise UnsupportedTypeError(
+        f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {ACCEPTED_SHAPES}", element="domain"
+    )

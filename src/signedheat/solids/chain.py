@@ -7,19 +7,21 @@ off its faces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, element_components, next_in_groups
-from ..mesh.edges import EdgeTable, FaceOrientation, agreeing, edge_keys, edge_table, pair_halfedges
+from ..mesh.edges import EdgeTable, FaceOrientation, agreeing, edge_keys, edge_table, orient_faces, pair_halfedges
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
 from ..surfaces.triangle_mesh import TriangleMesh
 
+AREA_ROUNDING = 1e-9
+"""Differences of areas up to this share are rounding."""
 ANY_DIRECTION = np.array([0.48, 0.62, 0.62079])
 """A direction that the planes of triangles hardly contain, which tells both sides of a plane apart."""
 
@@ -115,7 +117,10 @@ class Chain(Frozen):
         if (gaps <= ANGLE_ROUNDING).any():
             levels = _levels(gaps, onward, edges)
             upwards = (np.cross(along, into)[order] @ ANY_DIRECTION > 0) * 2 - 1
-            crowded = crowded[np.lexsort((upwards * (1 + self.joined(used)[crowded // 3]), levels, edges))]
+            parts = self.joined(used)  # by size, whatever the order of the triangles
+            sizes = np.rint(np.bincount(parts, self.areas) / (AREA_ROUNDING * self.areas.max()))[parts]
+            owners = crowded // 3
+            crowded = crowded[np.lexsort((upwards * (1 + parts[owners]), upwards * sizes[owners], levels, edges))]
         clear = ~np.isin(edges, edges[np.isnan(gaps)])
         return (
             np.concatenate([alone, first, second, crowded[clear]]),
@@ -132,12 +137,18 @@ class Chain(Frozen):
         even = (np.bincount(edges, one != other) % 2 == 0)[edges] & (one != other)
         return one[even], other[even]
 
+    def agreeing_across_pairs(self, used: Bools) -> FaceOrientation:
+        """Turn triangles so that those agree that share an edge with no third one."""
+        return orient_faces(self.faces, self.areas * np.sign(self.multiplicities), len(self.positions), used)
+
     def agreeing(self, used: Bools) -> FaceOrientation:
         """Turn neighbours so that they run opposite ways; most of the area of each piece stays as given."""
         one, other = self.neighbors(used)
         forward = self.edges.forward.ravel()
         weights = self.areas * np.sign(self.multiplicities)
-        return agreeing(one // 3, other // 3, forward[one] == forward[other], weights)
+        disagree = forward[one] == forward[other]
+        agreed = agreeing(one // 3, other // 3, disagree, weights)
+        return replace(agreed, disagreeing=len(np.unique(self.edges.face_edges.ravel()[one[disagree]])))
 
 
 def _without_folds(points: Floats, faces: Ints, joined: Ints) -> Ints:

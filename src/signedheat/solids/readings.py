@@ -18,6 +18,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
+from ..mesh.edges import FaceOrientation
 from ..mesh.triangles import cone_volumes
 from ..search.winding_tree import OFF_FACE, WindingTree, steps_off
 from .chain import Chain
@@ -82,17 +83,18 @@ def _one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
 
 def odd(chain: Chain) -> Reading:
     """Read a chain by its triangles that are there an odd number of times, turned to agree."""
-    return _turned(chain, chain.copies % 2 == 1)
+    used = chain.copies % 2 == 1
+    return _read(chain, used, chain.agreeing(used))
 
 
 def once(chain: Chain) -> Reading:
     """Read each triangle of a chain once, turned to agree, without walls between closed cells."""
-    return _turned(chain, ~walls(chain))
+    used = ~walls(chain)
+    return _read(chain, used, chain.agreeing_across_pairs(used))
 
 
-def _turned(chain: Chain, used: Bools) -> Reading:
-    """Read the used triangles of a chain, turned to agree."""
-    agreed = chain.agreeing(used)
+def _read(chain: Chain, used: Bools, agreed: FaceOrientation) -> Reading:
+    """Read the used triangles of a chain as they agree."""
     counts = np.where(agreed.turned, -1, 1) * (agreed.orientable[agreed.parts] & used)
     return Reading(counts, agreed.turned & used, agreed.parts, agreed.orientable, agreed.disagreeing)
 
