@@ -146,3 +146,9 @@ def test_orienting_keeps_rings_that_face_each_other_too():
     given = [pieces[0], pieces[1].reversed(), *pieces[2:]]
     assert sh.orientation(pieces, mesh).turned.tolist() == [False] * 6
     assert sh.orientation(given, mesh).turned.tolist() == [False, True, False, False, False, False]
+
+
+def test_rings_nearer_than_their_gaps_are_long():
+    """Three pieces each, with gaps nearly three times as long as the rings are apart: taken as they are drawn."""
+    mesh = tube()
+    assert not sh.orientation(rings(mesh, 0.3, 3, 0.4), mesh).turned.any()

@@ -218,7 +218,9 @@ def _ends_on(triangles: IntrinsicMesh, part: CurveSegments, is_edge: Bools) -> b
 def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
     """Return the reading of strokes that leaves the least length unexplained by heat: as given, turned, or left out.
 
-    As given is the first, and is taken if no other leaves clearly less. `every_piece` leaves none out.
+    As given is the first, and is taken if no other leaves clearly less. Against it, turning a stroke costs its length:
+    one that runs the wrong way leaves itself and a line beside it unexplained, one that runs the right way nothing,
+    however short other gaps are. What is left out then must leave less than that. `every_piece` leaves none out.
     """
     strokes, movable = pieces.strokes, pieces.movable
     given = strokes.by_heat(np.ones(len(movable)))
@@ -226,19 +228,25 @@ def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
         return Decision(pieces, given)
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
     rivals = cheapest(strokes, movable, smooth)
-    proposed = [rivals[0].signs, smooth]
+    turned = [given, *(strokes.by_heat(signs) for signs in (rivals[0].signs, smooth))]
+    others = least_costly(strokes, turned, [strokes.unexplained(x) + turned_length(strokes, x) for x in turned])
     if not every_piece:
-        proposed += [without_loose(rivals[0], movable), without_loose(strokes.inside(given.signs), movable)]
-    readings = [given, *(strokes.by_heat(signs) for signs in proposed if signs.any())]
-    lengths = np.array([strokes.unexplained(reading) for reading in readings])
-    is_good = lengths <= (1 + TIE) * max(float(lengths.min()), 0.0) + EQUAL_COSTS * strokes.lengths.sum()
-    reading = readings[int(is_good.argmax())]
+        loose = [without_loose(rivals[0], movable), without_loose(strokes.inside(given.signs), movable)]
+        readings = [others[0], *(strokes.by_heat(signs) for signs in loose if signs.any())]
+        left = least_costly(strokes, readings, [strokes.unexplained(x) for x in readings])
+        others = left if left[0] is not others[0] else [*others, *left[1:]]
+    reading = others[0]
     if reading is given:
         return Decision(pieces, given)
-    others = [other for other, good in zip(readings, is_good, strict=True) if good]
     apart = [strokes.changed_share(other, reading) for other in others]
     apart += [strokes.either_way(rivals[0]), *(strokes.changed_share(rival, rivals[0]) for rival in rivals)]
     return Decision(pieces, reading, tied=max(apart) > CHANGED_AREA)
+
+
+def least_costly(strokes: Strokes, readings: list[Inside], costs: list[float]) -> list[Inside]:
+    """Return the readings that cost about as little as the cheapest, in order."""
+    most = (1 + TIE) * max(min(costs), 0.0) + EQUAL_COSTS * strokes.lengths.sum()
+    return [reading for reading, each in zip(readings, costs, strict=True) if each <= most]
 
 
 def without_loose(inside: Inside, movable: Bools) -> Floats:
@@ -279,7 +287,12 @@ def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
 
 def cost(strokes: Strokes, inside: Inside) -> float:
     """Return the energy and the cost of turning."""
-    return inside.energy + TURNING_COST * float(strokes.lengths[inside.signs < 0].sum())
+    return inside.energy + TURNING_COST * turned_length(strokes, inside)
+
+
+def turned_length(strokes: Strokes, inside: Inside) -> float:
+    """Return the length of the strokes that are turned."""
+    return float(strokes.lengths[inside.signs < 0].sum())
 
 
 def misfit(strokes: Strokes, inside: Inside) -> float:
