@@ -13,6 +13,7 @@ from scipy import sparse
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..constraints import ZeroSet
+from ..errors import CancellingNormalsError
 from ..geodesics.exact_distance import shortest_arcs
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
@@ -361,7 +362,11 @@ class Strokes:
         Where φ is nearly 0 beside a stroke, its zero set follows the stroke.
         """
         taken = [[replace(p, vectors=s * p.vectors)] for p, s in zip(self.parts, signs.tolist(), strict=True) if s]
-        source = self.surface.lower(taken, 1.0)
+        try:
+            source = self.surface.lower(taken, 1.0)
+        except CancellingNormalsError:  # no side is positive, so that nothing is explained
+            positive = np.ones(self.surface.triangles.n_vertices)
+            return Inside(signs, positive, np.zeros(len(signs)), float(self.lengths.sum()))
         directions = normalize(self.surface, diffuse(self.surface, source))
         phi, beside = integrate(self.surface, directions, source, ZeroSet()), self.means.T @ signs
         is_near = np.abs(phi) <= FOLLOWED * self.surface.spacing

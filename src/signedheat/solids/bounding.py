@@ -25,7 +25,7 @@ from ..search.winding_tree import WindingTree
 from .chain import Chain
 from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces
-from .readings import Reading, as_given, mixed, odd, once, unexplained
+from .readings import Reading, as_given, mixed, odd, once, once_around, unexplained
 from .rims import meeting_edges, open_edges
 
 LEAST_GAIN = 0.1
@@ -111,17 +111,19 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
     doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
     differ = np.bincount(part_of[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
+    doubled = np.bincount(part_of[~whole], (chain.copies % 2 == 0)[~whole], len(missing)) > 0
     every, as_cavities = np.ones(len(missing), dtype=bool), "cavities" if nested == "given" else nested
     trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
         (by_odd, differ, WELL_EXPLAINED, True, nested),
         (by_once, every, WELL_EXPLAINED, True, nested),
+        (once_around(chain), doubled, WELL_EXPLAINED, True, nested),
         (by_once, every, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
         (by_once, every, MOSTLY_WRONG, True, as_cavities),
     )
     overlapping = False
     for number, (reading, told, least, united, nesting) in enumerate(trials):
         todo = doubtful & told & (missing >= least)
-        if not todo.any() or (number > 1 and not overlapping):
+        if not todo.any() or (number > 2 and not overlapping):
             continue
         readings.append(reading)
         best = float(part_areas @ missing), decided, chosen, missing

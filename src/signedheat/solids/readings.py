@@ -88,9 +88,15 @@ def odd(chain: Chain) -> Reading:
 
 
 def once(chain: Chain) -> Reading:
-    """Read each triangle of a chain once, turned to agree, without walls between closed cells."""
+    """Read each triangle once, without walls between closed cells, turned to agree across edges of two of them."""
     used = ~walls(chain)
     return _read(chain, used, chain.agreeing_across_pairs(used))
+
+
+def once_around(chain: Chain) -> Reading:
+    """Read each triangle once, without walls, turned to agree around edges of two, four, ... triangles."""
+    used = ~walls(chain)
+    return _read(chain, used, chain.agreeing(used))
 
 
 def _read(chain: Chain, used: Bools, agreed: FaceOrientation) -> Reading:

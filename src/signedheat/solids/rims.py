@@ -183,9 +183,9 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
             back = np.concatenate([places[rows] / size, -2.0 * ways[owners[rows]]], axis=1)
             near = tree.query(back, distance_upper_bound=2.0)[1]
             partners[edges] = np.where(near < len(places), near, -1).reshape(-1, EDGE_PLACES)
-    partners = partners.ravel()
-    first = np.flatnonzero(partners >= 0)
-    edge, other = owners[first], owners[partners[first]]
+    found = partners.ravel()
+    first = np.flatnonzero(found >= 0)
+    edge, other = owners[first], owners[found[first]]
     away = places[first] - ends[other, 0]
     lengths = np.linalg.norm(ends[other, 1] - ends[other, 0], axis=1)
     ahead = np.clip((away * ways[other]).sum(axis=1), 0.0, lengths)
