@@ -28,6 +28,7 @@ from signedheat.solids import bounding, completion, gauss, overlaps, regions
 
 MODULES = (bounding, gauss, overlaps)
 NUMBERS = (
+    "LEAST_GAIN", "WELL_EXPLAINED", "MOSTLY_WRONG",
     "SHEET", "COHERENT_LEVELS", "CHANCE_LEVEL", "PARTLY_INSIDE", "GAP_REACH", "HINT", "OUTSIDE", "WEIGHT_DAMPING",
     "PLANE_AGREEMENT", "LOOSE_DIPOLES", "SLENDER_TRIANGLE",
 )  # fmt: skip
