@@ -47,7 +47,7 @@ def test_parts_and_text(kind):
             sh.errors.UnsupportedTypeError,
             None,
         ),
-        (lambda: sh.SignedHeatSolver(TRIANGLE.path([0, 1])).discretization, sh.errors.UnsupportedTypeError, None),
+        (lambda: sh.SignedHeatSolver(TRIANGLE.path([0, 1])).discretization, sh.errors.UnsupportedTypeError, "domain"),
         (lambda: sh.sharpen(np.zeros(3)), sh.errors.UnsupportedTypeError, None),
         (lambda: sh.morphology.shell(TRIANGLE, 0.0, 0.1, TRIANGLE), sh.errors.UnsupportedTypeError, None),
     ],

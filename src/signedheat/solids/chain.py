@@ -20,7 +20,7 @@ from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
 from ..surfaces.triangle_mesh import TriangleMesh
 
-AREA_ROUNDING = 1e-9
+EQUAL_AREAS = 1e-9
 """Differences of areas up to this share are rounding."""
 ANY_DIRECTION = np.array([0.48, 0.62, 0.62079])
 """A direction that the planes of triangles hardly contain, which tells both sides of a plane apart."""
@@ -118,7 +118,7 @@ class Chain(Frozen):
             levels = _levels(gaps, onward, edges)
             upwards = (np.cross(along, into)[order] @ ANY_DIRECTION > 0) * 2 - 1
             parts = self.joined(used)  # by size, whatever the order of the triangles
-            sizes = np.rint(np.bincount(parts, self.areas) / (AREA_ROUNDING * self.areas.max()))[parts]
+            sizes = np.rint(np.bincount(parts, self.areas) / (EQUAL_AREAS * self.areas.max()))[parts]
             owners = crowded // 3
             crowded = crowded[np.lexsort((upwards * (1 + parts[owners]), upwards * sizes[owners], levels, edges))]
         clear = ~np.isin(edges, edges[np.isnan(gaps)])
