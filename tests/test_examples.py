@@ -46,6 +46,7 @@ EXPECTED = {
     "print_shell": (2 * np.pi * 0.12 - np.pi * 0.2**2 * 0.12, 0.06),
     "robot_clearance": (0.0, 0.01),
     "rounding_a_drawing": (1.0, 0.02),
+    "sections_and_cuts": (1.0, 0.01),
     "shapes_of_other_packages": (0.0, 1e-12),
     "sharp_contours": (0.0, 1e-9),
     "sharpened_distance": (0.0, 0.05),

@@ -7,9 +7,10 @@ from .solids.deviations import Deviation
 from .solids.holes import FilledMesh, FilledPolygonMesh
 from .solids.mesh_orientation import Orientation
 from .solids.sample_set import Samples
+from .solids.sections import Section
 from .solids.thickness import Thickness
 
 __all__ = [
     "Closest", "CurveOrientation", "Deviation", "Diagnostics", "FilledMesh", "FilledPolygonMesh", "Orientation",
-    "Samples", "Thickness",
+    "Samples", "Section", "Thickness",
 ]  # fmt: skip

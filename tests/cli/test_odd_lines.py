@@ -14,6 +14,8 @@ LINES = {
     "morph": ["dilate", "{file}", "{number}", "-o", "{out}.stl"],
     "fill": ["{file}", "-o", "{out}.stl"],
     "sample": ["{file}", "-o", "{out}.npz"],
+    "section": ["{file}", "-o", "{out}.svg"],
+    "cut": ["{file}", "-o", "{out}.stl"],
     "surface": ["{file}", "{curves}", "-o", "{out}.vtp"],
     "close": ["{file}", "{curves}", "-o", "{out}.obj"],
     "contour": ["{field}", "{number}", "-o", "{out}.stl"],
@@ -27,6 +29,8 @@ NUMBERS = {
     "morph": ["--resolution", "--spacing", "--padding", "--diffusion"],
     "fill": ["--largest", "--rims"],
     "sample": ["--samples", "--diffusion"],
+    "section": ["--origin", "--normal", "--heights"],
+    "cut": ["--origin", "--normal"],
     "surface": ["--contours", "--diffusion"],
     "close": ["--diffusion"],
     "info": ["--resolution"],
@@ -54,7 +58,7 @@ ODD_NUMBERS = ["nan", "-inf", "1e400", "-1", "abc", "", "0x10", "1,5", "٣x", "9
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     made = tmp_path_factory.mktemp("odd")
-    for ending in ("", ".stl", ".vti", ".npz", ".vtp", ".obj", ".png"):
+    for ending in ("", ".stl", ".vti", ".npz", ".vtp", ".obj", ".png", ".svg", "_above.stl"):
         (made / f"folder{ending}").mkdir()
     (made / "empty.stl").touch()
     for name in ("text.stl", "shape.xyzzy", "shape"):

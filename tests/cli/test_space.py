@@ -376,3 +376,25 @@ def test_boxes_are_combined(tmp_path, capsys, name, volume):
     assert inspect(result).is_closed
     assert set(np.abs(result.vertices).ravel()) <= {0.0, 1.0, 2.0}
     fail(capsys, name, files[0], "-o", output, code=2)
+
+
+def test_a_shape_is_cut_and_sliced(tmp_path, capsys):
+    """A box of which a face is missing: areas, volumes and coordinates in closed form."""
+    mesh = trimesh.creation.box([2, 2, 2])
+    mesh.update_faces(np.arange(12) > 0)
+    file, drawing, part = (str(tmp_path / name) for name in ("box.ply", "out.svg", "part.ply"))
+    mesh.export(file)
+    summary = json.loads(succeed(capsys, "section", file, "-o", drawing, "--json"))
+    assert [entry["area"] for entry in summary["sections"]] == [pytest.approx(4)]
+    [square] = sh.io.read_polylines(drawing)
+    assert square.closed and square.bounds.tolist() == [[-1, -1], [1, 1]]
+    succeed(capsys, "section", file, "-o", drawing, "--normal", "1", "1", "0", "--heights", "0", "0.5", "9")
+    [upright] = sh.io.read_polylines(tmp_path / "out_+0.5.svg")
+    assert upright.signed_area == pytest.approx(2 * (2 * np.sqrt(2) - 1))
+    assert not (tmp_path / "out_+9.svg").exists()
+    fail(capsys, "section", file, "-o", drawing, "--heights", "9")
+    fail(capsys, "section", file, "-o", "-", "--heights", "0", "1", code=2)
+    summary = json.loads(succeed(capsys, "cut", file, "-o", part, "--origin", "0", "0", "0.5", "--json"))
+    assert [half["volume"] for half in summary["halves"]] == pytest.approx([2, 6])
+    assert all(inspect(sh.read(half["output"])).is_closed for half in summary["halves"])
+    fail(capsys, "cut", file, "-o", part, "--origin", "0", "0", "5")

@@ -366,7 +366,12 @@ def counts(what: Any) -> dict[str, Any]:
 
 def output_names(output: str, distances: list[float]) -> list[str]:
     """Return the given name for one distance, or names with the distances in them for several."""
+    return [output] if len(distances) == 1 else [named_after(output, number) for number in distinct_names(distances)]
+
+
+def named_after(output: str, part: str) -> str:
+    """Return the name of an output with a part of its own before its extension."""
     path = Path(output)
-    if len(distances) == 1 or not path.name:  # what does not name a file is refused later
-        return [output]
-    return [str(path.with_name(f"{path.stem}_{number}{path.suffix}")) for number in distinct_names(distances)]
+    if not path.name:  # what does not name a file is refused later
+        return output
+    return str(path.with_name(f"{path.stem}_{part}{path.suffix}"))

@@ -38,6 +38,7 @@ CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGH
 
 
 COMMANDS_OF_OTHERS = {
+    "cap": "cut or fill",
     "boolean": "union, intersect or subtract",
     "check": "info",
     "clean": "watertight",
@@ -58,6 +59,9 @@ COMMANDS_OF_OTHERS = {
     "repair": "watertight",
     "sdf": "volume",
     "shell": "morph",
+    "slice": "section",
+    "split": "cut",
+    "trim": "cut",
     "show": "view",
     "thicken": "morph",
     "voxelize": "volume",
@@ -408,6 +412,13 @@ METHOD = group(
     option("--diffusion", type=positive, default=1.0, metavar="T", help="diffusion time in squared spacings (1)"),
 )
 SCHEDULER = option("--scheduler", metavar="ADDRESS", help="a running Dask cluster instead: tcp://host:port")
+
+
+PLANE = group(
+    "plane",
+    option("--origin", type=finite, nargs=3, metavar=("X", "Y", "Z"), help="a point of it (the middle of the shape)"),
+    option("--normal", type=finite, nargs=3, metavar=("X", "Y", "Z"), default=[0.0, 0.0, 1.0], help="its normal (z)"),
+)
 
 
 def workers(help: str) -> Option:

@@ -15,7 +15,19 @@ from .batch_commands import batch, watertight
 from .curve_commands import close, surface
 from .late_imports import compiled, kernel_runs, parallel
 from .options import Command, Summary, command, is_quiet
-from .solid_commands import contour, fill, intersect, morph, offset, sample, subtract, union, volume
+from .solid_commands import (
+    contour,
+    cut,
+    fill,
+    intersect,
+    morph,
+    offset,
+    sample,
+    section,
+    subtract,
+    union,
+    volume,
+)
 from .terminal import ProgressBar, say
 from .view_commands import demo, deviation, info, thickness, view
 
@@ -70,6 +82,6 @@ def run_job(name: str) -> None:
 
 
 COMMANDS: tuple[Command, ...] = (
-    volume, surface, close, offset, watertight, fill, contour, morph, union, intersect, subtract, sample, deviation,
-    thickness, batch, info, view, demo, warmup,
+    volume, surface, close, offset, watertight, fill, contour, morph, union, intersect, subtract, section, cut,
+    sample, deviation, thickness, batch, info, view, demo, warmup,
 )  # fmt: skip

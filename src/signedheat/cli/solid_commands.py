@@ -24,6 +24,7 @@ from .options import (
     LIDS_OPTION,
     METHOD,
     PLACE,
+    PLANE,
     REPAIR,
     SAMPLING,
     SLICES,
@@ -329,6 +330,93 @@ def combining(name: str) -> Command:
 
 
 union, intersect, subtract = map(combining, COMBINED)
+
+
+def check_section(arguments: Namespace) -> None:
+    """Reject several sections on standard output."""
+    if arguments.output == "-" and len(arguments.heights) > 1:
+        arguments.parser.error("standard output takes one section: name a file, or give one height")
+
+
+@command(
+    "section",
+    "outlines where planes cut a shape",
+    "Closed outlines where a plane, or parallel ones, cut a shape, broken or not. In the drawing, x and y are those of "
+    "the shape if the normal is z; in other planes, the second direction points upwards. Several heights make several "
+    "files: OUT.svg becomes OUT_+0.2.svg, OUT_+0.4.svg.",
+    shape_option(),
+    output("drawing: .svg .csv"),
+    PLANE,
+    option(
+        "--heights",
+        type=finite,
+        nargs="+",
+        default=[0.0],
+        metavar="H",
+        help="cut at these distances from the origin along the normal (0)",
+    ),
+    *(PLACE, REPAIR, METHOD, format_option("svg")),
+    check=check_section,
+    usage="SHAPE -o OUT.svg [options]",
+)
+def section(arguments: Namespace) -> Summary:
+    """Write the outlines, and lines of sheets, in each plane that meets the shape."""
+    outputs = shapes.output_names(arguments.output, arguments.heights)
+    for path in outputs:
+        shapes.ensure_surface_writable(path, planar=True)
+    solid = shapes.solid_of(arguments, arguments.shape)
+    with shapes.prefix_errors(arguments.shape):
+        origin = solid.bounds.mean(axis=0) if arguments.origin is None else arguments.origin
+        sections = solid.section(origin, arguments.normal, heights=arguments.heights)
+        cut = [(path, found) for path, found in zip(outputs, sections, strict=True) if found.outlines or found.sheets]
+        if not cut:
+            low, high = solid.bounds.tolist()
+            raise sh.errors.OutsideError(
+                f"no plane meets the shape, which reaches from {shapes.place(low)} to {shapes.place(high)}",
+                remedy="choose another origin, or other heights",
+                element="--origin",
+            )
+    unit = shapes.unit_in_use(arguments, arguments.shape)
+    for path, found in cut:
+        sh.io.write_polylines([*found.outlines, *found.sheets], path)
+    written = [
+        {"output": path, "outlines": len(found.outlines), "area": found.area, "lines_of_sheets": len(found.sheets)}
+        for path, found in cut
+    ]
+    text = "\n".join(
+        f"{printable(str(w['output']))}: {counted(int(w['outlines']), 'outline')}, area {w['area']:.6g}"
+        f"{shapes.named(unit, '²')}"
+        for w in written
+    )
+    return {"input": arguments.shape, "units": unit, "sections": written}, text
+
+
+@command(
+    "cut",
+    "a shape in two closed halves",
+    "Both parts of a shape, broken or not, on the two sides of a plane, each closed by caps: OUT.stl becomes "
+    "OUT_above.stl, the side that the normal points to, and OUT_below.stl.",
+    shape_option(),
+    output(f"{SURFACES}; solid: .npz"),
+    *(PLANE, PLACE, REPAIR, METHOD),
+    usage="SHAPE -o OUT.stl [options]",
+)
+def cut(arguments: Namespace) -> Summary:
+    """Write both halves of a shape."""
+    outputs = [shapes.named_after(arguments.output, side) for side in ("above", "below")]
+    for name in outputs:
+        sh.io.ensure_writable(name, (sh.io.SHAPE_FORMATS | {".npz"}) - {".xyz", ".pc"}, "a surface or a solid")
+    solid = shapes.solid_of(arguments, arguments.shape)
+    with shapes.prefix_errors(arguments.shape):
+        origin = solid.bounds.mean(axis=0) if arguments.origin is None else arguments.origin
+        halves = solid.cut(origin, arguments.normal)
+    unit = shapes.unit_in_use(arguments, arguments.shape)
+    written = []
+    for half, name in zip(halves, outputs, strict=True):
+        half.save(name)
+        written.append({"output": name, "volume": half.volume, "area": half.area})
+    text = "\n".join(f"{printable(w['output'])}: volume {w['volume']:.6g}{shapes.named(unit, '³')}" for w in written)
+    return {"input": arguments.shape, "units": unit, "halves": written}, text
 
 
 @command(

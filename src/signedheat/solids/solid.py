@@ -36,6 +36,7 @@ from .contouring import announce_lost, sharp_surface
 from .kept_faces import kept_surface
 from .offsets import Offset, Reach
 from .sample_set import NOISE_WIDTHS, Samples
+from .sections import Plane, Section, section_levels, sections
 from .simplification import simplified
 from .tiles import Scheduler, band_field, dense_field
 from .winding import ON_SURFACE, Windings
@@ -506,6 +507,97 @@ class Solid(Displayed, Represented, Frozen):
         Samples(100 points, 50 near the surface, distances from -0.6 to 0.489)
         """
         return sampling.sample_distances(self, n, near=near, widths=widths, seed=seed)
+
+    @overload
+    def section(self, origin: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0), *, heights: None = None) -> Section: ...
+    @overload
+    def section(
+        self, origin: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0), *, heights: ArrayLike
+    ) -> list[Section]: ...
+    @public_call
+    def section(
+        self, origin: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0), *, heights: ArrayLike | None = None
+    ) -> Section | list[Section]:
+        """Cut the solid by a plane, or by parallel planes, and return closed outlines.
+
+        They are exact, and closed however the plane passes through vertices and edges. Where faces lie in the plane,
+        the inside on either side of it counts.
+
+        Parameters
+        ----------
+        origin : (3,) float
+            A point of the plane.
+        normal : (3,) float
+            Its normal, of any length; z by default.
+        heights : (k,) float, optional
+            Cut by k planes at these distances from the origin along the normal, in one pass.
+
+        Returns
+        -------
+        Section, or list of Section if heights are given
+            Without outlines where a plane misses the solid.
+
+        Raises
+        ------
+        GeometryError
+            If the normal has no length, or a number is not finite.
+
+        See Also
+        --------
+        Solid.cut : Both halves of a solid, closed.
+        signedheat.to_shapely : The outlines as polygons with holes.
+        io.write_polylines : Write the outlines to a drawing.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> ball = complete(samples.without_faces(samples.sphere(5), 0.1))
+        >>> round(ball.section((0, 0, 0.6)).area, 2)  # a circle of radius 0.8
+        2.01
+        >>> [round(cut.area, 2) for cut in ball.section((0, 0, 0), (1, 1, 0), heights=[-0.8, 0.0, 2.0])]
+        [1.13, 3.14, 0.0]
+        """
+        plane, levels = Plane.of(origin, normal), section_levels(heights)
+        surface = self.surface() if self.bounding.any() else None
+        found = sections(surface, self.triangles[~self.bounding], plane, levels)
+        return found[0] if heights is None else found
+
+    @public_call
+    def cut(self, origin: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0)) -> tuple[Solid, Solid]:
+        """Cut the solid in two by a plane, and close both halves by flat caps; sheets are left out.
+
+        Parameters
+        ----------
+        origin : (3,) float
+            A point of the plane.
+        normal : (3,) float
+            Its normal, of any length; z by default.
+
+        Returns
+        -------
+        tuple of Solid
+            The part that the normal points to, and the part behind the plane. Caps are part of their completion.
+
+        Raises
+        ------
+        GeometryError
+            If the normal has no length, a number is not finite, or nothing is inside.
+        OutsideError
+            If the plane leaves all of the solid on one side.
+
+        See Also
+        --------
+        Solid.section : The outlines of the cut.
+        signedheat.fill_holes : Close holes, and leave the rest of a mesh as it is.
+
+        Examples
+        --------
+        >>> from signedheat import complete, samples
+        >>> above, below = complete(samples.sphere(5)).cut((0, 0, 0.5))
+        >>> round(above.volume, 2), round(below.volume, 2)  # of the segment, π h² (1 - h / 3) for h = 0.5
+        (0.65, 3.53)
+        """
+        return unions.halves(self, Plane.of(origin, normal))
 
     @overload
     def __or__(self, other: Solid) -> Solid: ...

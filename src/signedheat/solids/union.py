@@ -8,7 +8,7 @@ subtracted, across which such a sum passes ½; a box around both, turned inside 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
-from ..errors import SourceError
+from ..errors import GeometryError, OutsideError, SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged, meeting_faces
 from ..mesh.components import first_members
 from ..mesh.triangles import face_areas
@@ -26,6 +26,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..transforms import concatenated
 from .bodies import same_solid
 from .regions import cut_and_sided
+from .sections import Plane
 from .solid import Solid, completed_area, still_true
 from .winding import Windings
 
@@ -200,6 +201,30 @@ def intersection(a: Solid, b: Solid) -> Solid:
     corners = np.where(np.array(list(np.ndindex(2, 2, 2))) > 0, upper, lower)
     inwards = np.concatenate([BOX_SIDES[:, [0, 2, 1]], BOX_SIDES[:, [0, 3, 2]]])
     return _combination(a, b, turned=False, around=corners[inwards])
+
+
+def halves(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
+    """Return the parts of a solid in front of a plane and behind it, closed by caps: see `Solid.cut`."""
+    if not solid.bounding.any():
+        raise GeometryError("nothing of the shape bounds a solid", remedy="thicken it first", element="shape")
+    corners = solid.outward.reshape(-1, 3)
+    heights, slack = (corners - plane.origin) @ plane.axes[2], plane.rounding(corners)
+    low, high = float(heights.min()), float(heights.max())
+    if low >= -slack or high <= slack:
+        raise OutsideError(
+            f"the plane does not cut the solid, which reaches from {low:.4g} to {high:.4g} along its normal",
+            remedy="move the origin of the plane by a distance in between",
+            element="origin",
+        )
+    middle = corners.mean(axis=0)
+    foot = middle - ((middle - plane.origin) @ plane.axes[2]) * plane.axes[2]
+    room = 2.0 * float(np.linalg.norm(np.ptp(corners, axis=0)))
+    steps = np.array(list(np.ndindex(2, 2, 2))) * np.array([2, 2, 1]) - np.array([1, 1, 0])
+    sides = (foot + room * steps @ plane.axes)[np.concatenate([BOX_SIDES[:, [0, 1, 2]], BOX_SIDES[:, [0, 2, 3]]])]
+    made, sure, every = np.full(12, -1), np.ones(12, dtype=np.float32), np.ones(12, dtype=np.bool_)
+    half_space = Solid(sides, made, sure, every, Windings(sides))
+    front, back = intersection(solid, half_space), difference(solid, half_space)
+    return replace(front, source=solid.source), replace(back, source=solid.source)
 
 
 def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None) -> Solid:
