@@ -65,3 +65,16 @@ def test_a_house_has_its_volume_wherever_it_is(place, unit):
     volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
     walls = 20 * 16 * 12 - 18 * 14 * 10 + 5  # and the chimney, from which the wall takes one cube
     assert volume == pytest.approx(walls * (2 * unit) ** 3, rel=1e-9)
+
+
+def test_slivers_whose_sizes_differ_by_forty_decades_are_joined_in_the_end():
+    slivers = np.array(
+        [
+            [[-768.98566, 2e-41, -1.7e-25], [3.1e-22, 2e-41, 1.5e-5], [2e-41, 1.5e-5, 3.1e-22]],
+            [[-1.7e-25, -768.98474, 2e-41], [3.1e-22, 2e-41, 1.5e-5], [3.1e-22, 2e-41, 1.5e-5]],
+            [[2e-41, -1.7e-25, -770.98474], [2e-41, 1.5e-5, 3.1e-22], [2e-41, 0.0, 0.0]],
+        ]
+    )
+    points = slivers.astype(np.float32).astype(float).reshape(-1, 3)
+    joined = joined_rims(points, np.arange(9), np.arange(9) // 3 * 3 + (np.arange(9) + 1) % 3, ONE_PLACE)
+    assert (joined[joined] == joined).all()

@@ -7,6 +7,7 @@ import pytest
 
 import signedheat as sh
 from signedheat import samples
+from signedheat.solids.completion import scatter_of
 
 
 @pytest.mark.parametrize(("resolution", "padding"), [(16, 5.25), (24, 2.0), (32, 0.3)])
@@ -33,3 +34,18 @@ def test_what_lies_outside_the_grid_counts():
     field = sh.signed_distance(ball, grid)
     whole = sh.signed_distance(ball, sh.Grid((-1.5, -1.5, -1.5), 0.1, (31, 31, 31)))
     np.testing.assert_allclose(field.values, whole.values[15:], atol=1e-12)
+
+
+@pytest.mark.parametrize("noise", [1e-5, 1e-3, 1e-1])
+def test_cells_of_a_soup_are_not_much_finer_than_its_faces(noise):
+    ball = samples.sphere(1)
+    soup = ball.vertices[ball.faces] + np.random.default_rng(1).normal(scale=noise, size=(80, 3, 3))
+    cell = scatter_of(soup, np.arange(80))
+    assert cell >= noise and cell >= 0.05 * np.sqrt(4 * np.pi / 80)
+
+
+def test_triangles_on_one_line_bound_nothing():
+    shares = np.random.default_rng(5).random((300, 1))
+    faces = np.random.default_rng(6).integers(0, 300, (300, 3))
+    solid = sh.complete(sh.TriangleMesh(shares * [[1.0, 2.0, 3.0]], faces))
+    assert solid.volume == 0 and not solid.bounding.any()

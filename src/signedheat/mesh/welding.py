@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +19,8 @@ gap, in units of single precision of the size of the surface. Halved, a vertex i
 seams; doubled, nothing changes (`benchmarks/deciding_numbers.py`)."""
 SEAM_WIDTH = 0.25
 """Vertices farther apart than this share of the shortest edge at them are not joined as those of a seam."""
+MOST_REACHES = 32
+"""Parts of a mesh have at most this number of different reaches, or else these are rounded more coarsely."""
 _LOW = 0xFFFFFFFF
 """Mask of the low 32 bits."""
 
@@ -84,7 +84,7 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
         near = first[np.searchsorted(rims, rims[welded_within(points[rims], reaches)])]
         apart = np.abs(points[first] - points[near]).max(axis=1)
         joined = np.where(apart <= SEAM_WIDTH * np.minimum(shortest[first], shortest[near]), near, first)
-        if (joined == places[rims]).all():
+        if len(np.unique(joined)) >= len(np.unique(places[rims])):
             return places
         places[rims] = joined
 
@@ -110,17 +110,22 @@ def _rounding(points: Floats, parts: Ints, n: int, digits: int) -> Floats:
 def welded_within(points: Floats, reaches: Floats) -> Ints:
     """Return (n,) the point that each is joined to, or itself, given its own reach along each axis, (n,) or (n, 3).
 
-    Two points are joined if both reach the other. Reaches are rounded to powers of four times the largest one.
+    Two points are joined if both reach the other. Reaches are rounded to powers of four times the largest one, or of
+    larger numbers if that leaves more than `MOST_REACHES`.
     """
     reaches = np.broadcast_to(reaches[:, None] if reaches.ndim == 1 else reaches, points.shape)
     largest = reaches.max(axis=0, initial=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         levels = np.where(reaches > 0, np.rint(0.5 * np.log2(largest / reaches)), 512).astype(np.int64)
-    rows = np.array(list(product(*(np.unique(axis)[::-1] for axis in levels.T))), dtype=np.int64)
+    step = 1
+    while len(rows := np.unique(levels, axis=0)) > MOST_REACHES:
+        step *= 2
+        levels = -(-levels // 2)
+    rows = np.unique(np.maximum(rows[:, None], rows[None]).reshape(-1, 3), axis=0)
     owners = np.arange(len(points))
-    for row in rows:  # the least reaches come first
+    for row in rows[::-1]:  # the least reaches come first
         chosen, joined = np.flatnonzero((levels <= row).all(axis=1)), np.arange(len(points))
-        joined[chosen] = chosen[welded(points[chosen], np.ldexp(largest, -2 * row))]
+        joined[chosen] = chosen[welded(points[chosen], np.ldexp(largest, -2 * step * row))]
         owners = joined[owners]
     return owners
 

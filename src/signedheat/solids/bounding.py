@@ -97,7 +97,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     def changed(decided: Bounding, other: Bounding) -> Floats:
         """Share of the area of each part that counts in another way."""
         rows = np.flatnonzero(~whole & (decided.counts != other.counts))
-        return np.bincount(part_of[rows], chain.areas[rows], len(part_areas)) / part_areas
+        return np.bincount(part_of[rows], chain.areas[rows], len(part_areas)) / np.maximum(part_areas, 1e-300)
 
     missing = missing_of(decided)
     readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)

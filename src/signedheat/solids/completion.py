@@ -88,6 +88,8 @@ CELLS_PER_POINT_GAP = 2.0
 """Number of cells between neighbouring points of a cloud."""
 NOISE_RANGE = (1e-6, 0.75)
 """Range of distances between corners that noise has separated, relative to the square root of their triangle's area."""
+CELLS_PER_FACE = 8.0
+"""Cells of the zero set of φ are at least as wide as the loose faces over this number."""
 TORN_LEVEL = 0.2
 """Loose pieces are completed by heat below this level, where a fifth to two fifths of a body are left, else by lids,
 which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose 0.1 % too little and
@@ -367,7 +369,10 @@ def _completed_by_heat(
 
 
 def scatter_of(triangles: Floats, labels: Ints) -> float:
-    """Return the median distance between corners that noise has separated; 0 if it has not separated most of them."""
+    """Return the median distance between corners that noise has separated; 0 if it has not separated most of them.
+
+    It is at least the size of the faces over `CELLS_PER_FACE`: finer cells would show nothing more of them.
+    """
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)
     near, neighbours = PointTree(points).query(points, min(8, len(points)))
@@ -375,7 +380,9 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
     nearest = np.where(others, near, np.inf).min(axis=1)
     sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
     moved = (nearest > NOISE_RANGE[0] * sizes) & (nearest < NOISE_RANGE[1] * sizes)
-    return float(np.median(nearest[moved])) if moved.mean() > 0.5 else 0.0
+    if moved.mean() <= 0.5:
+        return 0.0
+    return max(float(np.median(nearest[moved])), float(np.median(sizes[moved])) / CELLS_PER_FACE)
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..errors import GeometryError, OutsideError, SourceError
-from ..mesh.arrangement import SAME_POINT, Arrangement, arranged, meeting_faces
+from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
 from ..mesh.components import first_members
+from ..mesh.self_intersections import overlapping_faces
 from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
 from ..parallel import PointTree
@@ -98,14 +99,14 @@ def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:
 
 def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrangement:
     """Divide faces where they meet: closing faces where they meet each other, all others where they meet these."""
-    pairs = meeting_faces(points, faces, slacks)
+    pairs = overlapping_faces(points, faces, slacks, closing)
     both = closing[pairs].all(axis=1)
     closed = np.flatnonzero(closing)
     number = np.cumsum(closing) - 1
     pieces = _arranged(points, faces, closed, number[pairs[both]], slacks)
     if closing.all():
         return pieces
-    across = pairs[closing[pairs].any(axis=1) & ~both]
+    across = pairs[~both]
     asked = ~closing
     asked[across] = True
     used = np.flatnonzero(asked)
