@@ -23,7 +23,7 @@ TRADES = {
     "Drawings and maps": "broken_letter toolpaths rounding_a_drawing floor_plan coastline terrain_from_contours",
     "Masks": "mask_and_back distance_on_voxels grid_of_your_own",
     "Surfaces and tets": (
-        "curve_distance curve_design distance_from_points turned_pieces curve_across_polygons "
+        "curve_distance curve_design distance_from_points shortest_paths turned_pieces curve_across_polygons "
         "curve_on_a_point_cloud distance_that_jumps distance_on_bad_triangles intrinsic_triangles wall_distance "
         "distance_on_tets distance_round_corners"
     ),

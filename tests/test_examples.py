@@ -50,6 +50,7 @@ EXPECTED = {
     "shapes_of_other_packages": (0.0, 1e-12),
     "sharp_contours": (0.0, 1e-9),
     "sharpened_distance": (0.0, 0.05),
+    "shortest_paths": (1.0, 0.001),
     "smooth_blends": (0.125, 0.01),
     "surface_from_points": (2 * np.pi**2 * 1.0 * 0.4**2, 0.06),
     "terrain_from_contours": (2.5, 0.35),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Frozen, Ints
+from ..calls import public_call
 from ..errors import SourceError
 from ..geodesics.shortest_paths import join
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -22,9 +23,14 @@ from ..mesh.surface_points import (
     refuse_missing,
 )
 from ..mesh.triangles import Triangles, area_vectors
+from ..packages import lazy_module
 from ..search.nearest_triangles import TriangleTree
 from ..validation import array_of, coordinates, finite_number, flag, numbers
-from .surface_curves import Curve, SurfacePoints
+from .surface_curves import Curve, CurveOrPoints, SurfacePoints
+
+surface_paths: Any = lazy_module("signedheat.surfaces.surface_paths", "shortest paths")
+Place: TypeAlias = int | ArrayLike | CurveOrPoints | Sequence[CurveOrPoints]
+"""A vertex, points in space, or curves and points on a surface."""
 
 ONE_CROSSING = 2e-5
 """Distance, relative to a face's least height, up to which consecutive points of a curve count as one: where rounding
@@ -210,6 +216,46 @@ class Surface(Frozen):
         """
         faces, weights = self._at_vertices(vertices, "point of the path")
         return Curve(faces, weights, closed=closed, oriented=oriented)
+
+    @public_call
+    def shortest_path(self, start: Place, end: Place) -> Curve:
+        """Find the shortest path along the surface: exact, straight in faces, and around corners where it must be.
+
+        Parameters
+        ----------
+        start : int, (3,) float, Curve or SurfacePoints; or several of these two
+            A vertex, the place of the surface nearest to a point in space, or curves and points, of which the path
+            leaves the nearest place. With ``field.contour()``, it leads from the zero set of a field.
+        end : int, (3,) or (n, 3) float, or SurfacePoints
+            Where the path leads: the nearest of these places.
+
+        Returns
+        -------
+        Curve
+            From start to end, without sides. Its length is the geodesic distance.
+
+        Raises
+        ------
+        SourceError
+            If the two lie on different connected components or at the same place, or a place does not exist.
+
+        See Also
+        --------
+        signedheat.signed_distance : Distance of all places from curves and points.
+        Curve : What is returned.
+
+        Examples
+        --------
+        Over two sides of a cube, between opposite corners:
+
+        >>> import signedheat as sh
+        >>> cube = sh.DigitalSurface([[[True]]]).squares
+        >>> path = cube.shortest_path([-0.5, -0.5, -0.5], [0.5, 0.5, 0.5])
+        >>> steps = np.diff(cube.positions(path), axis=0)
+        >>> round(float(np.linalg.norm(steps, axis=1).sum() ** 2), 6)
+        5.0
+        """
+        return surface_paths.shortest_path(self, start, end)
 
     def points_at(self, vertices: ArrayLike) -> SurfacePoints:
         """Take vertices as isolated point sources, from which φ grows in all directions.

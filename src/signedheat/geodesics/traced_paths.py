@@ -1,0 +1,179 @@
+"""Shortest paths on a polyhedral surface, traced back through the windows of an exact search for distances.
+
+The windows that have entered a face give the distance of each of its points, and the side by which the shortest path to
+it came. So a path is followed from its end, face by face, straight towards the source of the nearest window.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..arrays import Complexes, Floats, Ints
+from ..compiled import compiled
+from ..errors import SourceError
+from ..mesh.gluing import cross
+from ..mesh.intrinsic_mesh import IntrinsicMesh
+from ..mesh.surface_points import LocatedPoints, concatenated, locate_points
+from .exact_distance import BEAM, KIND, S0, S1, Faces, P, PausedSearch, Q, Search, arrival
+from .geodesic_sources import GeodesicSources, PlacedSegments
+from .shortest_paths import Places
+
+WINDOWS_AT_ONCE = 1 << 14
+"""Windows that are made until it is looked whether the end is reached."""
+AT_END = 1e-9
+"""Fraction of an edge from its end up to which a path crosses it at the vertex."""
+
+
+class SourcesByFace(NamedTuple):
+    """The segments and points in faces, in order of these."""
+
+    faces: Ints  # (k,)
+    starts: Complexes  # (k,) in the layout of the face
+    stops: Complexes
+
+    @classmethod
+    def of(cls, sources: GeodesicSources) -> SourcesByFace:
+        """Sort the sources of a search by face; points are segments without length."""
+        faces = np.concatenate([sources.beam_faces, sources.fan_faces])
+        order = np.argsort(faces, kind="stable")
+        starts = np.concatenate([sources.beam_starts, sources.fan_points])
+        stops = np.concatenate([sources.beam_stops, sources.fan_points])
+        return cls(faces[order], starts[order], stops[order])
+
+
+def traced_path(triangles: IntrinsicMesh, placed: PlacedSegments, ends: LocatedPoints) -> LocatedPoints:
+    """Return the points of the shortest path from sources to the nearest of some ends, one on each edge it crosses."""
+    paused = PausedSearch.start(triangles, placed, 0.0)
+    search, faces, places = paused.search, paused.faces, Places.of(triangles, ends)
+    corners = triangles.corner_vertices[places.faces]
+    gaps = np.abs(triangles.corner_positions[places.faces] - places.points[:, None])
+    late = 1.5 * float(triangles.lengths_of_edges.max())  # by which windows wait longer than vertices
+    while not paused.has_ended:
+        nearest = float((search.distance[corners] + gaps).min())
+        if search.queue.keys[search.queue.items[0]] > nearest + late:
+            break
+        paused.until(paused.windows + WINDOWS_AT_ONCE, None)
+    sources, best, points = SourcesByFace.of(placed.sources(triangles)), np.inf, ends[np.arange(0)]
+    for i in range(len(ends)):
+        length, crossed, weights = _trace(faces, search, sources, places, i)
+        if length < best:
+            best, points = length, concatenated([ends[np.array([i])], locate_points(triangles, crossed, weights)])
+    if not len(points):
+        raise SourceError(
+            f"no way along the surface joins the two places, of which one is in face {ends.faces[0]}: they lie on "
+            "different connected components",
+            element=f"face {ends.faces[0]}",
+        )
+    return points[np.arange(len(points))[::-1]]
+
+
+@compiled
+def _trace(
+    faces: Faces, search: Search, sources: SourcesByFace, places: Places, end: int
+) -> tuple[float, Ints, Floats]:
+    """Follow the shortest path from an end to the sources.
+
+    Returns its length, infinite if there is none, and the faces (k,) and barycentric coordinates (k, 3) of its points.
+    """
+    at_faces = places.faces[places.first[end] : places.first[end + 1]].copy()
+    at_points = places.points[places.first[end] : places.first[end + 1]].copy()
+    edge, vertex = np.int64(-1), np.int64(-1)  # on which the last point lies
+    total, found, shares, steps = np.inf, [0], [0.0], len(faces.edges) + len(search.distance)
+    found.pop()
+    shares.pop()
+    while steps > 0:
+        steps -= 1
+        best, kind, face, k, place = np.inf, DONE, 0, 0, 0j
+        for i in range(len(at_faces)):
+            f, x = at_faces[i], at_points[i]
+            for s in range(np.searchsorted(sources.faces, f), np.searchsorted(sources.faces, f, side="right")):
+                way = sources.stops[s] - sources.starts[s]
+                square = abs(way) ** 2
+                share = ((x - sources.starts[s]) * way.conjugate()).real / square if square > 0.0 else 0.0
+                foot = sources.starts[s] + min(max(share, 0.0), 1.0) * way
+                if abs(x - foot) < best:
+                    best, kind, face, place = abs(x - foot), AT_SOURCE, f, foot
+            for c in range(3):
+                v = faces.vertices[f, c]
+                away = search.distance[v] + abs(x - faces.positions[f, c])
+                if v != vertex and away < best * (1.0 - 1e-13):
+                    best, kind, face, k, place = away, AT_VERTEX, f, c, faces.positions[f, c]
+            for side in range(3):
+                passed = faces.vertices[f, side] == vertex or faces.vertices[f, (side + 1) % 3] == vertex
+                if passed or faces.edges[f, side] == edge:
+                    continue
+                away, share = _through_side(faces, search, 3 * f + side, x)
+                if away < best * (1.0 - 1e-13):
+                    best, kind, face, k = away, ACROSS, f, side
+                    place = faces.positions[f, side]
+                    place += share * (faces.positions[f, (side + 1) % 3] - place)
+                    if share < AT_END or share > 1.0 - AT_END:
+                        kind, k = AT_VERTEX, (side + np.int64(share > 0.5)) % 3
+        if vertex >= 0 and search.distance[vertex] <= best * (1.0 + 1e-13) and search.distance[vertex] == 0.0:
+            return total, np.array(found), np.array(shares).reshape(-1, 3)
+        if kind == DONE:
+            return np.inf, np.array(found), np.array(shares).reshape(-1, 3)
+        if total == np.inf:
+            total = best
+        corners = faces.positions[face]
+        whole = cross(corners[1] - corners[0], corners[2] - corners[0])
+        found.append(face)
+        for c in range(3):
+            if kind == AT_VERTEX:
+                shares.append(1.0 if c == k else 0.0)
+            elif kind == ACROSS and c == (k + 2) % 3:
+                shares.append(0.0)
+            else:
+                a, b = corners[(c + 1) % 3] - place, corners[(c + 2) % 3] - place
+                shares.append(max(cross(a, b) / whole, 0.0))
+        if kind == AT_SOURCE:
+            return total, np.array(found), np.array(shares).reshape(-1, 3)
+        if kind == AT_VERTEX:
+            edge, vertex = np.int64(-1), faces.vertices[face, k]
+            around = faces.corners[faces.first_corner[vertex] : faces.first_corner[vertex + 1]]
+            at_faces, at_points = around // 3, np.empty(len(around), np.complex128)
+            for i in range(len(around)):
+                at_points[i] = faces.positions[around[i] // 3, around[i] % 3]
+        else:
+            edge, vertex = faces.edges[face, k], np.int64(-1)
+            share = abs(place - faces.positions[face, k]) / faces.lengths[edge]
+            share = share if faces.forward[face, k] else 1.0 - share
+            halfedges = faces.halfedges[faces.first_halfedge[edge] : faces.first_halfedge[edge + 1]]
+            at_faces, at_points = halfedges // 3, np.empty(len(halfedges), np.complex128)
+            for i in range(len(halfedges)):
+                f, side = halfedges[i] // 3, halfedges[i] % 3
+                a, b = faces.positions[f, side], faces.positions[f, (side + 1) % 3]
+                at_points[i] = a + (share if faces.forward[f, side] else 1.0 - share) * (b - a)
+    return np.inf, np.array(found), np.array(shares).reshape(-1, 3)
+
+
+DONE, AT_SOURCE, AT_VERTEX, ACROSS = range(4)
+"""Kinds of steps of a path."""
+
+
+@compiled
+def _through_side(faces: Faces, search: Search, halfedge: int, x: complex) -> tuple[float, float]:
+    """Return the distance of a point of a face through one of its sides, and the fraction of the side it crosses at."""
+    face, side = halfedge // 3, halfedge % 3
+    length = faces.lengths[faces.edges[face, side]]
+    a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
+    ahead = faces.forward[face, side]
+    origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
+    local = (x - origin) * unit.conjugate()
+    along, up = local.real, abs(local.imag)
+    best, crossing, row = np.inf, 0.0, search.settled[halfedge]
+    while row >= 0:
+        w = search.windows[row]
+        row = search.following[row]
+        if w[KIND] == BEAM:
+            at = along - w[P] / w[Q] * up if w[Q] > 0.0 else along
+        else:
+            at = w[P] + (along - w[P]) * w[Q] / (w[Q] - up) if w[Q] < up else w[P]
+        at = min(max(at, w[S0]), w[S1])
+        away = arrival(w, at, 0.0) + np.sqrt((along - at) ** 2 + up**2)
+        if away < best:
+            best, crossing = away, at
+    share = crossing / length
+    return best, share if ahead else 1.0 - share
