@@ -98,7 +98,7 @@ def blobs(seed: int) -> sh.TriangleMesh:
     centers = np.random.default_rng(seed).uniform(-0.6, 0.6, (12, 3))
     grid = sh.Grid((-1.5, -1.5, -1.5), 0.03, (101, 101, 101))
     heights = sum(np.exp(-(((grid.points - c) / 0.3) ** 2).sum(axis=-1)) for c in centers)
-    level = sh.GridField(grid, 0.6 - heights).contour()
+    level = sh.Field(grid, 0.6 - heights).contour()
     parts = trimesh.Trimesh(level.vertices, level.faces, process=False).split(only_watertight=True)
     return of(max(parts, key=lambda part: len(part.faces)))
 
@@ -150,7 +150,7 @@ def case(mesh: sh.TriangleMesh, seed: int) -> tuple[list[sh.Curve], np.ndarray, 
     return curves, truth, error(sh.SignedHeatSolver(mesh, intrinsic=True).distance(curves), truth)
 
 
-def error(field: sh.VertexField, truth: np.ndarray) -> float:
+def error(field: sh.Field, truth: np.ndarray) -> float:
     return float(np.sqrt(np.mean((field.restrict().values - truth) ** 2)) / np.ptp(truth))
 
 

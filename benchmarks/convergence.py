@@ -22,7 +22,7 @@ from benchmarks.reproduction.baselines import cotan_laplacian, error
 from benchmarks.reproduction.shapes import mean_edge, organic, subdivided
 
 Array = np.ndarray
-Way = Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]
+Way = Callable[[sh.TriangleMesh, list[sh.Curve]], sh.Field[sh.TriangleMesh]]
 
 VERTICES, LEVELS, SOURCES = 1250, 4, 3
 EXACT = 1e-3  # per cent
@@ -82,7 +82,7 @@ def errors(base: sh.TriangleMesh) -> list[dict[str, tuple[list[float], list[floa
         for source, by_way in enumerate(found):
             heights = functions[:, source] + 0.0123  # off the vertices
             curves = mesh.level_set(heights, 0.0)
-            exact = sh.sharpen(sh.VertexField(mesh, heights)).values
+            exact = sh.sharpen(sh.Field(mesh, heights)).values
             for way, distance in WAYS.items():
                 edges, listed = by_way.setdefault(way, ([], []))
                 edges.append(mean_edge(mesh))

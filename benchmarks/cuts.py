@@ -77,10 +77,10 @@ def row(mesh: sh.TriangleMesh, curves: list[sh.Curve], **options: object) -> str
     phi = sh.piecewise_distance(curves, mesh, **options)
     seconds = time.process_time() - start
     note = phi.diagnostics.note(Jumps)
-    ends = Counter(int(end) for line in phi.cut for end in line.vertices[[0, -1]])
+    ends = Counter(int(end) for line in phi.domain.cuts(phi.values) for end in line.vertices[[0, -1]])
     forks = sum(count > 2 for count in ends.values())
     return (
-        f"{phi.triangles.n_faces:6d} | {len(phi.cut)} | {forks} | {note.cut_length:.2f} | "
+        f"{phi.domain.triangles.n_faces:6d} | {len(phi.domain.cuts(phi.values))} | {forks} | {note.cut_length:.2f} | "
         f"{note.integration_error:.4f} | {note.objective:.3f} | {seconds:.1f}"
     )
 

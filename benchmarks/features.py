@@ -36,9 +36,9 @@ def part() -> sh.TriangleMesh:
     """A block with a boss and a hole, closed, of one piece."""
     grid = sh.Grid((-1.5, -1.1, -0.9), 0.05, (61, 45, 41))
     x, y, z = np.moveaxis(grid.points, -1, 0)
-    block = sh.GridField(grid, np.maximum.reduce([np.abs(x) - 1.2, np.abs(y) - 0.8, np.abs(z + 0.2) - 0.3]))
-    boss = sh.GridField(grid, np.maximum(np.hypot(x - 0.4, y) - 0.4, np.abs(z) - 0.6))
-    hole = sh.GridField(grid, np.hypot(x + 0.6, y) - 0.3)
+    block = sh.Field(grid, np.maximum.reduce([np.abs(x) - 1.2, np.abs(y) - 0.8, np.abs(z + 0.2) - 0.3]))
+    boss = sh.Field(grid, np.maximum(np.hypot(x - 0.4, y) - 0.4, np.abs(z) - 0.6))
+    hole = sh.Field(grid, np.hypot(x + 0.6, y) - 0.3)
     return sh.morphology.smooth_difference(sh.morphology.smooth_union(block, boss, 0.2), hole, 0.1).contour()
 
 

@@ -145,7 +145,7 @@ def turns(outlines: Outlines, places: NDArray[np.float64]) -> NDArray[np.int64]:
     return total
 
 
-def error_of(field: sh.GridField, groups: list[Outlines], fill: str, random: Random) -> float:
+def error_of(field: sh.Field[sh.Grid], groups: list[Outlines], fill: str, random: Random) -> float:
     """Largest error of distance relative to the size: where the sign is wrong, twice the distance."""
     outlines = [points for group in groups for points in group]
     lines = shapely.unary_union([shapely.LinearRing(p) for p in outlines])
@@ -157,7 +157,7 @@ def error_of(field: sh.GridField, groups: list[Outlines], fill: str, random: Ran
     low, high = np.concatenate(outlines).min(axis=0), np.concatenate(outlines).max(axis=0)
     size = float((high - low).max())
     places = random.uniform(low - 0.2 * size, high + 0.2 * size, (POINTS, 2))
-    places = np.concatenate([places, field.grid.points.reshape(-1, 2)])
+    places = np.concatenate([places, field.domain.points.reshape(-1, 2)])
     values = np.concatenate([field(places[:POINTS]), field.values.ravel()])
     inside = shapely.contains_xy(filled, *places.T)
     exact = shapely.distance(shapely.points(places), filled.boundary) * np.where(inside, -1, 1)
@@ -166,13 +166,13 @@ def error_of(field: sh.GridField, groups: list[Outlines], fill: str, random: Ran
     return float(np.abs(values - exact)[known].max() / size)
 
 
-def draw(shown: list[tuple[str, sh.GridField, Outlines]], file: str) -> None:
+def draw(shown: list[tuple[str, sh.Field[sh.Grid], Outlines]], file: str) -> None:
     """What is inside, and lines of equal distance."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(20, 8))
     for axes, (title, field, outlines) in zip(figure.subplots(2, 5).flat, shown, strict=False):
-        x, y = field.grid.points.transpose(2, 0, 1)
+        x, y = field.domain.points.transpose(2, 0, 1)
         axes.contourf(x, y, field.values, levels=[-np.inf, 0, np.inf], colors=["#5a82dc", "#f0f0f0"])
         axes.contour(x, y, field.values, levels=12, colors="gray", linewidths=0.4)
         for points in outlines:

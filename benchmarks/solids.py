@@ -42,7 +42,7 @@ def shapes() -> dict[str, Mesh]:
     bumps = 1 + 0.12 * np.sin(5 * ball.vertices[:, :1]) * np.cos(4 * ball.vertices[:, 1:2] + ball.vertices[:, 2:])
     grid = sh.Grid((-1.3, -1.0, -0.4), 0.05, (53, 41, 17))
     away = np.abs(grid.points) - [1.0, 0.7, 0.1]
-    plate = sh.GridField(grid, np.linalg.norm(np.maximum(away, 0), axis=-1) + np.minimum(away.max(axis=-1), 0) - 0.04)
+    plate = sh.Field(grid, np.linalg.norm(np.maximum(away, 0), axis=-1) + np.minimum(away.max(axis=-1), 0) - 0.04)
     return {
         "part": part(),
         "bumpy ball": Mesh(ball.vertices * bumps, ball.faces),

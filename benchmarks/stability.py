@@ -171,8 +171,8 @@ def measured(mesh: sh.TriangleMesh, random: np.random.Generator) -> tuple[dict[s
     apart = 0.0
     for padding, resolution in ((0.1, 40), (0.5, 64), (2.0, 128)):
         field = solid.field(resolution, padding=padding * size)
-        nodes = random.integers(0, np.prod(field.grid.shape), 500)
-        at = field.grid.points.reshape(-1, 3)[nodes]
+        nodes = random.integers(0, np.prod(field.domain.shape), 500)
+        at = field.domain.points.reshape(-1, 3)[nodes]
         apart = max(apart, float(np.abs(field.values.ravel()[nodes] - solid.distance(at)).max()) / size)
     return found, apart
 

@@ -19,10 +19,7 @@ FLOORS = [
     ("solver   sharpening", "SignedHeatSolver: a domain and its factors; distance to the zero set of φ", "#fbf1de"),
     ("surfaces   grids   tets", "slices: domain, operators, sources, discretisation, sharpening, field", "#d3e8ea"),
     (
-        (
-            "area_elements field_arithmetic field_kinds field_levels foreign geometries inspection kinds "
-            "sharpening_methods transforms"
-        ),
+        ("area_elements fields foreign geometries inspection kinds sharpening_methods transforms"),
         "one function for all slices, by type",
         "#d3e8ea",
     ),

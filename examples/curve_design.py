@@ -12,8 +12,8 @@ from signedheat import view
 
 grid = sh.Grid((-1.5, -1.2, -1.0), 0.06, (51, 41, 34))
 x, y, z = np.moveaxis(grid.points, -1, 0)
-block = sh.GridField(grid, np.maximum.reduce([np.abs(x) - 1.2, np.abs(y) - 0.8, np.abs(z) - 0.5]))
-boss = sh.GridField(grid, np.maximum(np.hypot(x - 0.4, y) - 0.4, np.abs(z) - 0.9))
+block = sh.Field(grid, np.maximum.reduce([np.abs(x) - 1.2, np.abs(y) - 0.8, np.abs(z) - 0.5]))
+boss = sh.Field(grid, np.maximum(np.hypot(x - 0.4, y) - 0.4, np.abs(z) - 0.9))
 part = sh.morphology.smooth_union(block, boss, 0.2).contour()
 
 angle = np.linspace(0, 2 * np.pi, 241)

@@ -15,7 +15,7 @@ found = sh.sample_distances(sh.signed_distance(ball, resolution=48), 4000)
 found.save("ball.npz", "deepsdf")
 
 grid = sh.Grid((-1.2, -1.2), 0.02, (121, 121))
-exact = sh.GridField(grid, np.linalg.norm(grid.points, axis=-1) - 1)
+exact = sh.Field(grid, np.linalg.norm(grid.points, axis=-1) - 1)
 thin = found.points[np.abs(found.points[:, 1]) < 0.1][:, [0, 2]]
 view.save_row(
     [

@@ -24,7 +24,7 @@ found.save("deviation.ply")
 view.save_row(
     [
         ("the nominal part, broken", nominal),
-        (f"{found.within(0.015):.0%} of the scan within 0.015", sh.VertexField(scan, found.distances)),
+        (f"{found.within(0.015):.0%} of the scan within 0.015", sh.Field(scan, found.distances)),
     ],
     "deviation_of_a_scan.png",
 )

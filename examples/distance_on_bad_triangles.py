@@ -28,7 +28,7 @@ def sheared_square(n: int, stretch: float) -> tuple[sh.TriangleMesh, sh.Curve]:
     return mesh, mesh.polyline(circle, closed=True)
 
 
-def error(field: sh.VertexField) -> float:
+def error(field: sh.Field) -> float:
     """Against the exact distance, positive inside the circle, which runs counter-clockwise."""
     exact = RADIUS - np.linalg.norm(field.domain.vertices, axis=1)
     return float(np.sqrt(np.mean((field.values - exact) ** 2)) / np.ptp(exact))
@@ -40,7 +40,7 @@ better = sh.intrinsic_delaunay(mesh, keep=curve, refine=True)
 robust = sh.SignedHeatSolver(better).distance(curve)
 grid = sh.Grid((-1.0, -1.0), 0.01, (201, 201))
 points = np.concatenate([grid.points.reshape(-1, 2), np.zeros((grid.n_nodes, 1))], axis=1)
-shown = [sh.GridField(grid, field(points).reshape(grid.shape)) for field in (plain, robust)]
+shown = [sh.Field(grid, field(points).reshape(grid.shape)) for field in (plain, robust)]
 view.save_row(
     [
         (f"{mesh.n_faces} bad triangles: error {100 * error(plain):.0f} %", shown[0]),

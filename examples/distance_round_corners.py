@@ -37,7 +37,7 @@ middle = np.stack([x, y, 0.5 + 0 * x], axis=-1).reshape(-1, 3)
 values = np.where((np.abs(x - 1.5) < 0.1) & (y < 1.5), np.nan, phi(middle).reshape(x.shape))
 figure = view.new_figure(9.0, 5.0)
 axes = figure.add_subplot()
-view.draw_plane(sh.GridField(plane, values), axes)
+view.draw_plane(sh.Field(plane, values), axes)
 axes.set_title("round a baffle, from a sphere without a third of its faces")
 figure.savefig("distance_round_corners.png")
 

@@ -28,7 +28,7 @@ figure, axes = plt.subplots(1, 3, figsize=(13, 4.5), layout="constrained")
 lengths = []
 for panel, (title, (mesh, sources)) in zip(axes, cases.items(), strict=True):
     phi = sh.piecewise_distance(sources, mesh)
-    cut = phi.cut[0]
+    cut = phi.domain.cuts(phi.values)[0]
     lengths.append(cut.length)
     print(f"{title}: {phi.diagnostics.note(Jumps).gap:.1%} from the least objective at most; {cut}")
     direction = np.array([0.2, -0.8, 0.7]) if mesh is ring else np.array([0.9, 0.3, 0.5])

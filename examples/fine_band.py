@@ -22,7 +22,7 @@ values = band(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3)).reshape(x.shape)
 view.save_row(
     [
         ("in: three holes", broken),
-        ("fine to the thin lines, coarse beyond", sh.GridField(slice_grid, values), {"levels": [-0.12, 0.12]}),
+        ("fine to the thin lines, coarse beyond", sh.Field(slice_grid, values), {"levels": [-0.12, 0.12]}),
         ("out: closed", surface),
     ],
     "fine_band.png",

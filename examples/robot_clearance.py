@@ -31,9 +31,9 @@ for _ in range(20):
     path[1:-1] += (np.clip(RADIUS - phi(path), 0, None)[:, None] * phi.gradient(path))[1:-1] * [1, 1, 0]
 missing = np.clip(RADIUS - phi(path), 0, None).max()
 
-flat = sh.Grid(phi.grid.origin[:2], phi.grid.spacing[:2], phi.grid.shape[:2])
+flat = sh.Grid(phi.domain.origin[:2], phi.domain.spacing[:2], phi.domain.shape[:2])
 points = np.insert(flat.points.reshape(-1, 2), 2, 0.0, axis=1)
-plane = sh.GridField(flat, phi(points).reshape(flat.shape))
+plane = sh.Field(flat, phi(points).reshape(flat.shape))
 view.save_row(
     [
         ("the scan", scan, {"view": (60, -70)}),

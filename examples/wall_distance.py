@@ -25,7 +25,7 @@ solid = blocks | (y < 0.1) | (y > 1.1)
 
 walls = sh.Polyline.from_mask(solid, spacing=grid.spacing)
 to_walls = ~sh.signed_distance([line.reversed() for line in walls], grid)
-free = sh.GridField(grid, np.where(solid, np.nan, np.abs(to_walls.values)))
+free = sh.Field(grid, np.where(solid, np.nan, np.abs(to_walls.values)))
 
 channel = squares(~solid[::4, ::4], 0.05)
 inlet = channel.polyline([[0.05, 1.1, 0.0], [0.05, 0.15, 0.0]])

@@ -14,7 +14,7 @@ scan = samples.with_flipped_faces(samples.with_noise(scan, 0.008, seed=2), 0.1, 
 phi = sh.signed_distance(scan, resolution=52)
 closed = phi.contour()
 closed.save("part.stl")
-confidence = sh.GridField(phi.grid, phi.values.clip(max=0.3))
+confidence = sh.Field(phi.domain, phi.values.clip(max=0.3))
 
 view.save_row(
     [

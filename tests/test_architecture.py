@@ -31,15 +31,13 @@ FLOORS = [
         "words",
     },
     {"mesh"},
-    {"search", "linear", "exchange"},
+    {"search", "linear", "exchange", "fields.field_domain"},
     {"geodesics"},
     {"constraints", "direct_integration", "discretization", "method"},
     {"surfaces", "grids", "tets"}
     | {
         "area_elements",
-        "field_arithmetic",
-        "field_kinds",
-        "field_levels",
+        "fields",
         "foreign",
         "geometries",
         "inspection",

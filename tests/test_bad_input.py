@@ -17,7 +17,7 @@ GRID = sh.Grid((-2, -2, -2), 0.25, (17, 17, 17))
 PLANE = sh.Grid((0, 0), 1.0, (8, 8))
 BOX = boxes((2, 2, 2), 1.0)
 POINTS = samples.oriented_points(BALL, 50)
-HEIGHT = sh.VertexField(BALL, BALL.vertices[:, 2])
+HEIGHT = sh.Field(BALL, BALL.vertices[:, 2])
 NAN, INF = float("nan"), float("inf")
 
 
@@ -40,7 +40,7 @@ def case(name, *arguments, error=sh.errors.SignedHeatError, **keywords):
         case("no source was given", [], 0.1, error=sh.errors.SourceError),
         case("no source was given", [], 0.1, BALL, error=sh.errors.SourceError),
         case("not to a NoneType", None, 0.1, error=sh.errors.SourceError),
-        case("not to a VertexField", HEIGHT, 0.1, error=sh.errors.SourceError),
+        case("not to a Field", HEIGHT, 0.1, error=sh.errors.SourceError),
         case("pass that surface as the domain", RING, 0.1, error=sh.errors.SourceError),
         case("whole number of at least 2", BALL, 0.1, resolution=1, error=sh.errors.GeometryError),
         case("lower resolution", BALL, 0.1, resolution=100_000, error=sh.errors.MemoryLimitError),
@@ -184,7 +184,7 @@ def test_several_sources_are_a_list(sources):
 def test_numbers_are_not_missing_or_text():
     for value in (None, "1"):
         with refused(sh.errors.GeometryError, element="values"):
-            sh.GridField(sh.Grid(0.0, 1.0, 2), np.array([0.0, value], dtype=object))
+            sh.Field(sh.Grid(0.0, 1.0, 2), np.array([0.0, value], dtype=object))
 
 
 @pytest.mark.parametrize(
@@ -232,28 +232,26 @@ ROUND = np.linalg.norm(GRID.points, axis=-1) - 1
         case("a NoneType cannot be sharpened", None, error=sh.errors.UnsupportedTypeError),
         case("a TriangleMesh cannot be sharpened", BALL, error=sh.errors.UnsupportedTypeError),
         case(
-            "a PiecewiseField cannot be sharpened",
+            "on a CutSurface cannot be sharpened",
             sh.piecewise_distance(RING, BALL),
             error=sh.errors.UnsupportedTypeError,
         ),
-        case("cannot be sharpened", sh.GridField(GRID, with_one(ROUND, INF)), error=sh.errors.GeometryError),
-        case("one sign", sh.GridField(GRID, 0 * ROUND + 1), error=sh.errors.OutsideError),
+        case("cannot be sharpened", sh.Field(GRID, with_one(ROUND, INF)), error=sh.errors.GeometryError),
+        case("one sign", sh.Field(GRID, 0 * ROUND + 1), error=sh.errors.OutsideError),
         case(
             "infinite at vertex 5",
-            sh.VertexField(BALL, with_one(BALL.vertices[:, 2], INF)),
+            sh.Field(BALL, with_one(BALL.vertices[:, 2], INF)),
             error=sh.errors.GeometryError,
         ),
-        case("no value anywhere", sh.VertexField(BALL, np.full(BALL.n_vertices, NAN)), error=sh.errors.OutsideError),
-        case("one sign", sh.VertexField(BALL, np.zeros(BALL.n_vertices)), error=sh.errors.OutsideError),
-        case(
-            "infinite at vertex 5", sh.TetField(BOX, with_one(BOX.vertices[:, 2], INF)), error=sh.errors.GeometryError
-        ),
-        case("no value anywhere", sh.TetField(BOX, np.full(BOX.n_vertices, NAN)), error=sh.errors.OutsideError),
-        case("one sign", sh.TetField(BOX, np.zeros(BOX.n_vertices)), error=sh.errors.OutsideError),
+        case("no value anywhere", sh.Field(BALL, np.full(BALL.n_vertices, NAN)), error=sh.errors.OutsideError),
+        case("one sign", sh.Field(BALL, np.zeros(BALL.n_vertices)), error=sh.errors.OutsideError),
+        case("infinite at vertex 5", sh.Field(BOX, with_one(BOX.vertices[:, 2], INF)), error=sh.errors.GeometryError),
+        case("no value anywhere", sh.Field(BOX, np.full(BOX.n_vertices, NAN)), error=sh.errors.OutsideError),
+        case("one sign", sh.Field(BOX, np.zeros(BOX.n_vertices)), error=sh.errors.OutsideError),
         case("comes without one", HEIGHT, method=sh.methods.Convex(), error=sh.errors.SourceError),
         case(
             "comes without one",
-            sh.TetField(BOX, BOX.vertices[:, 0]),
+            sh.Field(BOX, BOX.vertices[:, 0]),
             method=sh.methods.Convex(),
             error=sh.errors.SourceError,
         ),
@@ -268,7 +266,7 @@ def test_sharpen(arguments, keywords, error):
 
 def test_methods_are_for_surfaces_and_tets():
     with refused(sh.errors.UnsupportedTypeError):
-        sh.sharpen(sh.GridField(GRID, ROUND), method=sh.methods.Convex())
+        sh.sharpen(sh.Field(GRID, ROUND), method=sh.methods.Convex())
 
 
 @pytest.mark.parametrize(

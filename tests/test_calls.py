@@ -102,7 +102,7 @@ def test_medical_images(tmp_path):
 
 @pytest.mark.parametrize("progress", ["x", np.zeros(3), 1], ids=repr)
 def test_progress_must_be_a_function(progress):
-    field = sh.VertexField(BALL, V[:, 2])
+    field = sh.Field(BALL, V[:, 2])
     for call in (
         lambda: sh.complete(BALL, progress=progress),
         lambda: sh.signed_distance(BALL, resolution=4, progress=progress),
@@ -126,7 +126,7 @@ def test_commands_of_other_programs(capsys):
 
 @pytest.mark.parametrize("number", [np.nan, np.inf, -np.inf, np.float32("nan")], ids=str)
 def test_fields_are_not_combined_with_what_is_no_number(number):
-    for field in (sh.VertexField(BALL, V[:, 2]), sh.GridField(sh.Grid(0.0, 1.0, 3), [-1.0, 0.0, 1.0])):
+    for field in (sh.Field(BALL, V[:, 2]), sh.Field(sh.Grid(0.0, 1.0, 3), [-1.0, 0.0, 1.0])):
         for operation in (
             lambda phi: phi + number,
             lambda phi: number + phi,
@@ -153,7 +153,7 @@ def test_other_kinds_of_things():
 
 
 def test_progress_of_sharpening_ends_whatever_the_field_is():
-    for field in (sh.complete(BALL).field(4), sh.VertexField(BALL, V[:, 2])):
+    for field in (sh.complete(BALL).field(4), sh.Field(BALL, V[:, 2])):
         told = []
         sh.sharpen(field, progress=lambda fraction, step, told=told: told.append(fraction))
         assert told[-1] == 1.0

@@ -144,7 +144,7 @@ def test_fields_have_values_gradients_and_contours_anywhere(ball):
         assert field(surface.vertices) == pytest.approx(level, abs=0.02)
     else:
         if ball.name != "voxels":  # whose squares are no tangent planes
-            assert np.median(np.linalg.norm(field.face_gradients, axis=1)) == pytest.approx(1, abs=0.02)
+            assert np.median(np.linalg.norm(field.cell_gradients, axis=1)) == pytest.approx(1, abs=0.02)
         (contour,) = field.contour(level)
         assert contour.closed
         assert field(contour) == pytest.approx(level, abs=1e-9)

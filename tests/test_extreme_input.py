@@ -103,9 +103,9 @@ def test_sizes_within_give_the_same_distances(scale):
         lambda x: sh.constraints.LevelValues(x),
         lambda x: sh.constraints.Soft(-1.0 if x is None else x),
         lambda x: sh.tetrahedralize(BALL, resolution=x),
-        lambda x: sh.GridField(x, np.zeros((3, 3))),
-        lambda x: sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), x),
-        lambda x: sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), np.zeros((3, 3)))(x),
+        lambda x: sh.Field(x, np.zeros((3, 3))),
+        lambda x: sh.Field(sh.Grid((0, 0), 1.0, (3, 3)), x),
+        lambda x: sh.Field(sh.Grid((0, 0), 1.0, (3, 3)), np.zeros((3, 3)))(x),
         lambda x: sh.Polyline([[0, 0], [1, 1]], closed=x),
     ],
 )
@@ -200,7 +200,7 @@ def test_the_convex_method_stays_bounded_where_the_field_is_constant(scale):
     for constraint in (None, sh.constraints.Free()):
         field = sh.SignedHeatSolver(mesh).distance(mesh.points_at([0, 1, 2, 3, 4]), constraint)
         assert np.abs(field.values).max() < scale
-        tiny = sh.VertexField(mesh, np.array([0, 1, -1, 2, -2]) * 1e-95 * scale, source=field.source)
+        tiny = sh.Field(mesh, np.array([0, 1, -1, 2, -2]) * 1e-95 * scale, source=field.source)
         for made in (field, tiny):
             assert np.abs(sh.sharpen(made, method=sh.methods.Convex()).values).max() < 10 * scale
 

@@ -24,11 +24,11 @@ resource = pytest.importorskip("resource", reason="limits and signals of POSIX")
 
 BALL = samples.sphere(2)
 GRID = sh.Grid([0, 0, 0], 0.5, [12, 12, 12])
-FIELD = sh.GridField(GRID, np.random.default_rng(0).normal(size=GRID.shape))
+FIELD = sh.Field(GRID, np.random.default_rng(0).normal(size=GRID.shape))
 CLOUD = sh.PointCloud(BALL.vertices, BALL.vertices)
-ON_BALL = sh.VertexField(BALL, BALL.vertices[:, 0])
+ON_BALL = sh.Field(BALL, BALL.vertices[:, 0])
 TETS = sh.TetMesh(np.random.default_rng(1).random((400, 3)), np.arange(400).reshape(100, 4))
-ON_TETS = sh.TetField(TETS, np.arange(400.0))
+ON_TETS = sh.Field(TETS, np.arange(400.0))
 LINE = sh.Polyline(np.random.default_rng(2).random((99, 2)))
 CURVE = BALL.path(list(range(40)))
 
@@ -109,7 +109,7 @@ def stopped(folder, number, delay):
 def whole(folder):
     """Outputs are whole: the old ones or the new ones."""
     phi = sh.read_field(folder / "phi.npz")
-    assert phi.grid.shape in ((12, 12, 12), (40, 40, 40))
+    assert phi.domain.shape in ((12, 12, 12), (40, 40, 40))
 
 
 def ready(folder):

@@ -22,7 +22,7 @@ def field(kind):
         return sh.signed_distance(ball, resolution=24, band=0.3)
     if kind == "tets":
         mesh = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
-        return sh.TetField(mesh, mesh.vertices[:, 2] - 0.3)
+        return sh.Field(mesh, mesh.vertices[:, 2] - 0.3)
     curve = ball.path(np.flatnonzero(np.abs(ball.vertices[:, 2]) < 0.05)[:2])
     solver = {"vertices": sh.SignedHeatSolver(ball).distance, "piecewise": lambda c: sh.piecewise_distance(c, ball)}
     return solver[kind](curve)

@@ -265,7 +265,7 @@ SMALL_BALL = samples.sphere(1)
     [
         lambda: sh.TriangleMesh(TOO_MANY, [[0, 1, 2]]),
         lambda: sh.complete(SMALL_BALL).distance(TOO_MANY),
-        lambda: sh.GridField(sh.Grid((0, 0, 0), 1.0, (3, 3, 3)), np.zeros((3, 3, 3)))(TOO_MANY),
+        lambda: sh.Field(sh.Grid((0, 0, 0), 1.0, (3, 3, 3)), np.zeros((3, 3, 3)))(TOO_MANY),
         lambda: sh.deviation(TOO_MANY, SMALL_BALL),
         lambda: sh.signed_distance(sh.Polyline([[0, 0], [1, 0], [0, 1]], closed=True), resolution=10**7),
     ],

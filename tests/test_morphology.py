@@ -28,7 +28,7 @@ def radii(mesh):
 def box_with_arms():
     grid = sh.Grid.around(np.array([[-1.5, -0.5, -0.5], [1.5, 0.5, 0.5]]), resolution=64, padding=0.1)
     arms = [distance_to_box(grid.points, -half, half) for half in np.array([[0.5, 0.5, 0.5], [1.5, 0.1, 0.1]])]
-    return sh.GridField(grid, np.minimum(*arms)).contour(0.0)
+    return sh.Field(grid, np.minimum(*arms)).contour(0.0)
 
 
 def waved_sheet(n=20):

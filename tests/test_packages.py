@@ -26,7 +26,7 @@ USES = {
     "meshio": lambda folder: CUBE.to_meshio(),
     "pyvista": lambda folder: CUBE.to_pyvista(),
     "matplotlib": lambda folder: save_scene(CUBE, folder / "scene.png"),
-    "skimage": lambda folder: sh.GridField(sh.Grid([0, 0], 1, [3, 3]), np.eye(3) - 0.5).contour(0.0),
+    "skimage": lambda folder: sh.Field(sh.Grid([0, 0], 1, [3, 3]), np.eye(3) - 0.5).contour(0.0),
 }
 """What needs each package that may be missing."""
 

@@ -17,7 +17,7 @@ def surface_of(polydata: object) -> tuple[np.ndarray, np.ndarray]:
 # signedheat
 
 
-def our_field(shape: object) -> sh.GridField:
+def our_field(shape: object) -> sh.Field[sh.Grid]:
     return sh.signed_distance(shape, resolution=96, padding=0.35)
 
 

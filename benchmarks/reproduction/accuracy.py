@@ -58,7 +58,7 @@ def whole_and_broken(page: Page) -> None:
 
 
 def row_of_surfaces(
-    shown: Mapping[str, tuple[sh.VertexField[sh.TriangleMesh], list[sh.Curve]]], view: Array | None = None
+    shown: Mapping[str, tuple[sh.Field[sh.TriangleMesh], list[sh.Curve]]], view: Array | None = None
 ) -> Figure:
     """Fields with their curves, side by side, by title."""
     picture = new_figure(5 * len(shown), 4.4)
@@ -132,7 +132,7 @@ def planar_errors(mesh: sh.TriangleMesh, lines: list[sh.Polyline], slow_ones: bo
     near = np.flatnonzero(distance < 1.2 * shapes.mean_edge(mesh))
     start = dict(zip(near.tolist(), distance[near].tolist(), strict=True))
 
-    def heat() -> sh.VertexField[sh.TriangleMesh]:
+    def heat() -> sh.Field[sh.TriangleMesh]:
         return sh.SignedHeatSolver(mesh, 1.0, intrinsic=True).distance(curves).restrict()
 
     ways: dict[str, Callable[[], Array]] = {
@@ -166,7 +166,7 @@ def convergence(page: Page) -> None:
     coarsest. Falls: on how many ε falls at every level. On eleven decimated scans (`python -m benchmarks.convergence
     MESH ...`) the default has orders from 0.60 to 1.06, one time from 0.18 to 0.78.
     """
-    ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.VertexField[sh.TriangleMesh]]] = {
+    ways: dict[str, Callable[[sh.TriangleMesh, list[sh.Curve]], sh.Field[sh.TriangleMesh]]] = {
         "default": lambda mesh, curves: sh.SignedHeatSolver(mesh).distance(curves),
         "one time": lambda mesh, curves: sh.SignedHeatSolver(mesh, 1.0).distance(curves),
         "mesh as it is": lambda mesh, curves: sh.SignedHeatSolver(mesh, intrinsic=False).distance(curves),
@@ -183,7 +183,7 @@ def convergence(page: Page) -> None:
         for mesh in meshes:
             heights = shapes.height(mesh.vertices, seed)
             curves = mesh.level_set(heights, 0.0)
-            exact = sh.sharpen(sh.VertexField(mesh, heights)).values
+            exact = sh.sharpen(sh.Field(mesh, heights)).values
             for name, measure in ways.items():
                 errors[name][-1].append(baselines.error(measure(mesh, curves).values, exact))
     sizes = np.array(lengths)

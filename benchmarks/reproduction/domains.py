@@ -54,7 +54,7 @@ def robust_domains(page: Page) -> None:
     picture = new_figure(15, 4.6)
     for k, (name, mesh, curve, exact, view) in enumerate((_book(), _moebius(), _sieve())):
         if name == "Möbius strip":
-            field = sh.piecewise_distance(curve, mesh).split()
+            field = sh.piecewise_distance(curve, mesh).expand()
             corners = mesh.faces.ravel()
             given = field.values[field.domain.faces].ravel()
             values = np.bincount(corners, given) / np.bincount(corners)

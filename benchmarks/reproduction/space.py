@@ -58,7 +58,7 @@ def completed_surfaces(page: Page) -> None:
     grid = sh.Grid.around(broken.bounds, resolution=72, padding=0.3)
     winding = baselines.solid_winding(grid.points.reshape(-1, 3), broken).reshape(grid.shape)
     fields = {
-        "GWN, level ½": sh.GridField(grid, 0.5 - winding),
+        "GWN, level ½": sh.Field(grid, 0.5 - winding),
         "GSD, interpolating": sh.SignedHeatSolver(grid).distance(broken, sh.constraints.ZeroSet()),
         "GSD, approximating": sh.SignedHeatSolver(grid).distance(broken, sh.constraints.Free()),
     }
@@ -88,7 +88,7 @@ def offsets_of_broken_surfaces(page: Page) -> None:
     fields = {
         "method alone": sh.SignedHeatSolver(grid).distance(broken),
         "sh.signed_distance": sh.signed_distance(broken, grid),
-        "winding sign × exact distance": sh.GridField(grid, signed.reshape(grid.shape)),
+        "winding sign × exact distance": sh.Field(grid, signed.reshape(grid.shape)),
     }
     picture = new_figure(15, 4.2)
     draw_shape(broken, picture.add_subplot(1, 4, 1))
@@ -153,7 +153,7 @@ def signing_unsigned_distance(page: Page) -> None:
         page.add(input=f"{gaps} gaps, {share:.0%} gone", **errors)
     for k, (name, values) in enumerate({"unsigned distance × winding sign": signed, "GSD": ways["GSD"]}.items()):
         axes = picture.add_subplot(1, 2, k + 1)
-        draw_plane(sh.GridField(grid, values.reshape(grid.shape)), axes, lines)
+        draw_plane(sh.Field(grid, values.reshape(grid.shape)), axes, lines)
         axes.set_title(name)
     page.draw(picture)
 
@@ -237,7 +237,7 @@ def broken_geometry_on_tets(page: Page) -> None:
         )
         if name.startswith("8 holes"):
             levels = {"GSD, level 0": field.contour(0.0), "level 0.15": field.contour(0.15)}
-            sides = sh.TetField(mesh, 0.5 - baselines.solid_winding(points, broken))
+            sides = sh.Field(mesh, 0.5 - baselines.solid_winding(points, broken))
             picture = new_figure(15, 4.2)
             for k, (title, shape) in enumerate({name: broken, "GWN, level ½": sides.contour(0.0), **levels}.items()):
                 axes = picture.add_subplot(1, 4, k + 1)
@@ -256,7 +256,7 @@ def natural_completion(page: Page) -> None:
     cup = sh.TriangleMesh(ball.vertices, ball.faces[centers[:, 2] < rim])
     grid = sh.Grid.around(ball.bounds, resolution=96, padding=0.7)
     winding = baselines.solid_winding(grid.points.reshape(-1, 3), cup).reshape(grid.shape)
-    fields = {"GWN, level ½": sh.GridField(grid, 0.5 - winding)}
+    fields = {"GWN, level ½": sh.Field(grid, 0.5 - winding)}
     for diffusion in (1.0, 10.0, 100.0):
         fields[f"GSD, t = {diffusion:g} h²"] = sh.SignedHeatSolver(grid, diffusion=diffusion).distance(cup)
     picture = new_figure(15, 4)
@@ -268,6 +268,6 @@ def natural_completion(page: Page) -> None:
         axes = picture.add_subplot(1, 4, k + 1)
         middle = grid.shape[1] // 2
         cut = sh.Grid(grid.origin[[0, 2]], grid.spacing[[0, 2]], (grid.shape[0], grid.shape[2]))
-        draw_plane(sh.GridField(cut, field.values[:, middle]), axes)
+        draw_plane(sh.Field(cut, field.values[:, middle]), axes)
         axes.set_title(name)
     page.draw(picture)

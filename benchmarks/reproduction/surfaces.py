@@ -43,7 +43,7 @@ def no_bias_at_the_boundary(page: Page) -> None:
             **{"ε %": baselines.error(values, exact), "ε % near the rim": baselines.error(values[rim], exact[rim])},
         )
         axes = picture.add_subplot(1, 2, k + 1)
-        draw_surface(sh.VertexField(mesh, values), axes, [curve], view=FROM_ABOVE)
+        draw_surface(sh.Field(mesh, values), axes, [curve], view=FROM_ABOVE)
         axes.set_title(name)
     page.draw(picture)
 
@@ -89,7 +89,7 @@ def level_set_constraints(page: Page) -> None:
     for k, (name, constraint) in enumerate(constraints.items()):
         field = solver.distance(curves, constraint)
         spread = max(float(np.ptp(field(curve))) for curve in curves)
-        slope = float(np.mean(np.abs(1 - np.linalg.norm(field.face_gradients, axis=1))))
+        slope = float(np.mean(np.abs(1 - np.linalg.norm(field.cell_gradients, axis=1))))
         page.add(constraint=name, spread=spread, **{"slope error": slope})
         axes = picture.add_subplot(1, 3, k + 1)
         draw_surface(field, axes, curves, view=FROM_ABOVE)
@@ -117,7 +117,7 @@ def soft_constraints(page: Page) -> None:
     picture = new_figure(20, 4.4)
     for k, (name, constraint) in enumerate(constraints.items()):
         field = solver.distance(curve, constraint)
-        slope = float(np.mean(np.abs(1 - np.linalg.norm(field.face_gradients, axis=1))))
+        slope = float(np.mean(np.abs(1 - np.linalg.norm(field.cell_gradients, axis=1))))
         page.add(constraint=name, **{"mean |φ| on the curve": float(np.abs(field(curve)).mean()), "slope error": slope})
         axes = picture.add_subplot(1, 4, k + 1)
         draw_surface(field, axes, [curve], view=FROM_ABOVE)
@@ -144,11 +144,11 @@ def curves_that_bound_nothing(page: Page) -> None:
         field = sh.piecewise_distance(curves, mesh)
         slopes = [
             float(np.mean(np.abs(1 - np.linalg.norm(gradient, axis=1))))
-            for gradient in (continuous.face_gradients, field.split().face_gradients)
+            for gradient in (continuous.cell_gradients, field.expand().cell_gradients)
         ]
         page.add(
             curve=name,
-            **{"length of the cut": float(sum(part.length for part in field.cut))},
+            **{"length of the cut": float(sum(part.length for part in field.domain.cuts(field.values)))},
             **{"slope error, continuous": slopes[0], "piecewise": slopes[1]},
         )
         axes = picture.add_subplot(1, 3, k + 1)

@@ -402,7 +402,7 @@ class Jumps(Note):
     continuous: bool  # whether there is no cut
     largest_jump: float
     cut_length: float  # total length of all cuts
-    integration_error: float  # root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of `PiecewiseField.split`
+    integration_error: float  # root mean square of ∇φ̄ − Y, φ̄ being φ averaged at the vertices of `Field.expand`
 
     def __str__(self) -> str:
         cut = "continuous" if self.continuous else f"cuts of length {self.cut_length:.3g}"

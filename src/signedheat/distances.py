@@ -15,10 +15,9 @@ from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, Zer
 from .curves.curve_distance import distance_to_curves
 from .curves.drawings import distance_to_lines
 from .errors import SourceError, UnsupportedTypeError
-from .field_kinds import Field
+from .fields.field import Field
 from .foreign import ForeignShape, as_list, as_shapes, converted
 from .grids.grid import Dimension, Grid, room_around
-from .grids.grid_field import GridField
 from .jobs import Progress, within
 from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
 from .mesh.polylines import FillRule
@@ -33,8 +32,6 @@ from .surfaces.extrapolation import Diffusion
 from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
-from .surfaces.vertex_field import VertexField
-from .tets.tet_field import TetField
 from .tets.tet_mesh import TetMesh
 from .transforms import joined_shape
 from .validation import positive_number, refuse_beside
@@ -60,7 +57,7 @@ def signed_distance(
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     progress: Progress | None = None,
-) -> GridField[Literal[3]]: ...
+) -> Field[Grid[Literal[3]]]: ...
 @overload
 def signed_distance(
     source: Polylines,
@@ -75,7 +72,7 @@ def signed_distance(
     as_oriented: bool = False,
     every_piece: bool = False,
     progress: Progress | None = None,
-) -> GridField[Literal[2]]: ...
+) -> Field[Grid[Literal[2]]]: ...
 @overload
 def signed_distance(
     source: SpaceSources,
@@ -90,7 +87,7 @@ def signed_distance(
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     progress: Progress | None = None,
-) -> GridField[Dimension]: ...
+) -> Field[Grid[Dimension]]: ...
 @overload
 def signed_distance(
     source: Shapes,
@@ -104,7 +101,7 @@ def signed_distance(
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     progress: Progress | None = None,
-) -> TetField: ...
+) -> Field[TetMesh]: ...
 @overload
 def signed_distance(
     source: CurvesAndPoints | ElementList | Sequence[ElementList],
@@ -116,7 +113,7 @@ def signed_distance(
     as_oriented: bool = False,
     every_piece: bool = False,
     progress: Progress | None = None,
-) -> VertexField[AnySurface]: ...
+) -> Field[AnySurface]: ...
 @overload
 def signed_distance(
     source: Sources,
@@ -193,7 +190,7 @@ def signed_distance(
 
     Returns
     -------
-    GridField, TetField or VertexField
+    Field
         φ is negative inside shapes and filled outlines, and to the right of curves and strokes; positive on both sides
         of sheets that bound nothing. ``diagnostics.notes`` say what was flipped, left out and completed.
 
@@ -276,7 +273,7 @@ def distance_to_solid(
     padding: float | None = None,
     band: float | None = None,
     progress: Progress | None = None,
-) -> GridField | TetField:
+) -> Field[Grid] | Field[TetMesh]:
     """Compute the signed distance to a solid: see `signed_distance`."""
     if domain is None or isinstance(domain, Grid):
         return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
@@ -378,7 +375,7 @@ def distance_to_shapes(
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     progress: Progress | None = None,
-) -> GridField | TetField:
+) -> Field[Grid] | Field[TetMesh]:
     """Compute the signed distance to shapes in space: see `signed_distance`."""
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
@@ -396,7 +393,7 @@ def completed_distance(
     band: float | None = None,
     progress: Progress | None = None,
     **tiles: Any,
-) -> GridField | TetField:
+) -> Field[Grid] | Field[TetMesh]:
     """Complete a shape, then measure distance to the solid: on a grid by `Solid.field`, or at the vertices of tets."""
     if band is not None and not isinstance(domain, Grid):
         raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
@@ -404,5 +401,5 @@ def completed_distance(
     progress = within(progress, 0.5, 1.0)
     if isinstance(domain, Grid):
         return solid.field(grid=domain, band=band, progress=progress, **tiles)
-    phi = sharpen(TetField(domain, solid.distance(domain.vertices)), solid.boundary, progress=progress)
+    phi = sharpen(Field(domain, solid.distance(domain.vertices)), solid.boundary, progress=progress)
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))

@@ -70,7 +70,7 @@ class Displayed:
             `pyvista.PolyData` of triangles, polygons, lines or points, `pyvista.ImageData` of grids, and
             `pyvista.UnstructuredGrid` of tets. Values of a field are point data ``signed_distance``, normals of points
             ``Normals``. Lines and grids in the plane have z = 0. A solid gives its boundary, voxels their faces, an
-            intrinsic triangulation its mesh, and a `PiecewiseField` what `split` returns, so that the jumps show.
+            intrinsic triangulation its mesh, and a cut surface what `Field.expand` returns, so that the jumps show.
 
         Raises
         ------

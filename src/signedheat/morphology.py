@@ -24,11 +24,10 @@ from .errors import (
     UnsupportedTypeError,
     warn_user,
 )
-from .field_arithmetic import smooth_difference, smooth_intersection, smooth_union
-from .field_kinds import Field
+from .fields.blends import smooth_difference, smooth_intersection, smooth_union
+from .fields.field import Field
 from .foreign import as_list, as_shape, converted
 from .grids.grid import RESOLUTION, Grid, room_around
-from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .jobs import Progress
 from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
@@ -47,7 +46,6 @@ from .surfaces.point_cloud import PointCloud
 from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
-from .surfaces.vertex_field import VertexField
 from .tets.tet_mesh import TetMesh
 from .transforms import concatenated
 from .validation import array_of, callback, chosen, finite_number, flag, numbers, positive_number, refuse_beside
@@ -451,7 +449,7 @@ def shell(
         solid: object = complete(shape)
     else:
         field = (measure or signed_distance)(shape, grid)
-        solid = field.solid if isinstance(field, GridField) else None
+        solid = field.solid
     if keep_outside:
         if not isinstance(solid, Solid):
             raise SourceError(
@@ -468,7 +466,7 @@ def shell(
     else:
         if not (field.values < inner).any():
             _warn_not_hollow(inner)
-        wall = GridField(grid, np.maximum(inner - field.values, field.values - outer)).offset(0.0)
+        wall = Field(grid, np.maximum(inner - field.values, field.values - outer)).offset(0.0)
     wall = _without_crumbs(wall, outer - inner)
     return wall if hole is None else _drained(wall, hole, float(grid.spacing.max()))
 
@@ -662,7 +660,7 @@ def _offsets(
     for sign in signs:
         field = (measure or signed_distance)(shape, domain)
         level = sign * distance
-        shape = boundary = field.contour(level) if isinstance(field, VertexField) else field.offset(level)
+        shape = boundary = field.offset(level)
     return boundary
 
 

@@ -3,13 +3,12 @@
 from . import batches, constraints, errors, io, methods, morphology, results, samples, torch, view
 from .curves.curve_completion import close_curves
 from .curves.jumping_distance import piecewise_distance
-from .curves.piecewise_field import PiecewiseField
 from .distances import signed_distance
 from .errors import SignedHeatError
+from .fields.field import Field
 from .foreign import as_shape
 from .geometries import to_shapely
 from .grids.grid import Grid
-from .grids.grid_field import GridField
 from .grids.polyline import Polyline
 from .grids.redistancing import redistance
 from .io import read, read_field, save
@@ -31,9 +30,7 @@ from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.subdivision import common_subdivision
 from .surfaces.surface_curves import Curve, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
-from .surfaces.vertex_field import VertexField
 from .tets.lattice import tetrahedralize
-from .tets.tet_field import TetField
 from .tets.tet_mesh import TetMesh
 from .transforms import transform
 
@@ -41,9 +38,9 @@ MODULES = (batches, constraints, errors, io, methods, morphology, results, sampl
 """Modules whose contents are used by the name of the module; ``from signedheat import *`` does not import them."""
 
 __all__ = [
-    "Curve", "DigitalSurface", "Grid", "GridField", "IntrinsicTriangulation", "PiecewiseField", "PointCloud",
-    "PolygonMesh", "Polyline", "SignedHeatError", "SignedHeatSolver", "Solid", "SurfacePoints", "TetField",
-    "TetMesh", "TriangleMesh", "VertexField", "as_shape", "close_curves", "common_subdivision", "complete",
+    "Curve", "DigitalSurface", "Field", "Grid", "IntrinsicTriangulation", "PointCloud",
+    "PolygonMesh", "Polyline", "SignedHeatError", "SignedHeatSolver", "Solid", "SurfacePoints",
+    "TetMesh", "TriangleMesh", "as_shape", "close_curves", "common_subdivision", "complete",
     "contour", "deviation", "fill_holes", "intrinsic_delaunay", "offset", "orient", "orientation",
     "piecewise_distance", "read", "read_field", "redistance", "sample_distances", "save", "sharpen",
     "signed_distance", "tetrahedralize", "to_shapely", "transform", "wall_thickness",

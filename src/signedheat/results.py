@@ -1,8 +1,10 @@
 """Classes of what functions and methods return, for annotations."""
 
+from .curves.cut_surface import Cut, CutSurface
 from .curves.stroke_directions import CurveOrientation
 from .diagnostics import Diagnostics
-from .grids.solid_queries import Closest
+from .fields.solid_queries import Closest
+from .grids.band import Band
 from .solids.deviations import Deviation
 from .solids.holes import FilledMesh, FilledPolygonMesh
 from .solids.mesh_orientation import Orientation
@@ -11,6 +13,6 @@ from .solids.sections import Section
 from .solids.thickness import Thickness
 
 __all__ = [
-    "Closest", "CurveOrientation", "Deviation", "Diagnostics", "FilledMesh", "FilledPolygonMesh", "Orientation",
-    "Samples", "Section", "Thickness",
+    "Band", "Closest", "CurveOrientation", "Cut", "CutSurface", "Deviation", "Diagnostics", "FilledMesh",
+    "FilledPolygonMesh", "Orientation", "Samples", "Section", "Thickness",
 ]  # fmt: skip

@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .fields.field import Field
 from .grids.grid import Grid
-from .grids.grid_field import GridField
 from .surfaces.point_cloud import PointCloud
 from .surfaces.triangle_mesh import TriangleMesh
 from .transforms import joined_triangles
@@ -98,7 +98,7 @@ def duck(n: int = 56) -> TriangleMesh:
     depth = [(np.linalg.norm((x - center) / np.array(axes), axis=-1) - 1) * min(axes) for center, axes in lumps]
     softness = 0.05
     blend = -softness * np.logaddexp.reduce([-d / softness for d in depth], axis=0)
-    body = GridField(grid, blend).contour(0.0)
+    body = Field(grid, blend).contour(0.0)
     beak = sphere(3)
     beak = TriangleMesh(beak.vertices * (0.2, 0.15, 0.07) + (0.88, 0.0, 0.6), beak.faces)
     return union(body, beak)

@@ -5,36 +5,38 @@ from __future__ import annotations
 from typing import TypeVar, overload
 
 from .calls import public_call
-from .field_kinds import Field
+from .fields.field import Field
 from .grids import redistancing  # noqa: F401  registers how its fields are sharpened
-from .grids.grid import Dimension
-from .grids.grid_field import GridField
+from .grids.grid import Dimension, Grid
 from .jobs import Progress
-from .kinds import Shapes
-from .sharpening_methods import Method, sharpen_field
+from .kinds import Shapes, SurfaceDomain
+from .sharpening_methods import Method, sharpen_on
 from .surfaces import surface_sharpening  # noqa: F401  registers how its fields are sharpened
 from .surfaces.surface_curves import CurvesAndPoints
-from .surfaces.vertex_field import VertexField
 from .tets import tet_sharpening  # noqa: F401  registers how its fields are sharpened
-from .tets.tet_field import TetField
+from .tets.tet_mesh import TetMesh
 
-OnSurface = TypeVar("OnSurface", bound=VertexField)
+OnSurface = TypeVar("OnSurface", bound=SurfaceDomain)
 
 
 @overload
-def sharpen(field: GridField[Dimension], *, progress: Progress | None = None) -> GridField[Dimension]: ...
+def sharpen(field: Field[Grid[Dimension]], *, progress: Progress | None = None) -> Field[Grid[Dimension]]: ...
 @overload
 def sharpen(
-    field: OnSurface,
+    field: Field[OnSurface],
     source: CurvesAndPoints | None = None,
     *,
     method: Method | None = None,
     progress: Progress | None = None,
-) -> OnSurface: ...
+) -> Field[OnSurface]: ...
 @overload
 def sharpen(
-    field: TetField, source: Shapes | None = None, *, method: Method | None = None, progress: Progress | None = None
-) -> TetField: ...
+    field: Field[TetMesh],
+    source: Shapes | None = None,
+    *,
+    method: Method | None = None,
+    progress: Progress | None = None,
+) -> Field[TetMesh]: ...
 @overload
 def sharpen(field: Field, *, progress: Progress | None = None) -> Field: ...
 @public_call
@@ -68,7 +70,7 @@ def sharpen(
 
     Parameters
     ----------
-    field : GridField, VertexField or TetField
+    field : Field
         From `signed_distance` or `SignedHeatSolver.distance`.
     source : curves and points, or meshes, optional
         What the field was computed from. On surfaces `Curve`, `SurfacePoints` or a sequence of them; on tets
@@ -80,8 +82,8 @@ def sharpen(
 
     Returns
     -------
-    GridField, VertexField or TetField
-        The same kind of field, with a note `diagnostics.SharpenedToShape` or `diagnostics.SharpenedToCurves`. On
+    Field
+        On the same domain, with a note `diagnostics.SharpenedToShape` or `diagnostics.SharpenedToCurves`. On
         surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the root mean squares of ``|∇φ| − 1``
         over the domain before and after, and notes of the method. If slopes became clearly worse, an `InexactWarning`
         is issued, and the note says so.
@@ -108,11 +110,11 @@ def sharpen(
     Examples
     --------
     >>> import numpy as np
-    >>> from signedheat import Grid, GridField
+    >>> from signedheat import Field, Grid
     >>> grid = Grid(origin=(-1, -1, -1), spacing=0.1, shape=(21, 21, 21))
     >>> radius = np.linalg.norm(grid.points, axis=-1)
-    >>> sharpened = sharpen(GridField(grid, radius**2 - 0.25))
+    >>> sharpened = sharpen(Field(grid, radius**2 - 0.25))
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
     True
     """
-    return sharpen_field(field, source, method, progress)
+    return sharpen_on(getattr(field, "domain", None), field, source, method, progress)

@@ -27,15 +27,14 @@ from .errors import (
     UnsupportedTypeError,
     warn_user,
 )
-from .field_kinds import Field
+from .fields.field import Field
+from .fields.field_domain import FieldDomain
 from .geodesics.exact_distance import Report
 from .jobs import Progress
 from .linear.splitting import split_rounds
 from .linear.threads import one_blas_thread
 from .mesh.intrinsic_mesh import IntrinsicMesh
 from .mesh.tet_shapes import Tetrahedra
-from .surfaces.vertex_field import VertexField
-from .tets.tet_field import TetField
 from .validation import finite_number, positive_number
 
 ADDED_SLOPE_ERROR = 0.1
@@ -329,15 +328,16 @@ def typical_size(sizes: Floats, dimension: int) -> float:
 
 
 @singledispatch
-def sharpen_field(field: object, source: Any, method: Method | None, progress: Progress | None) -> Field:
-    """Sharpen a field; every kind of field registers a function of its own. `sharpen` is the public function."""
+def sharpen_on(domain: object, field: Any, source: Any, method: Method | None, progress: Progress | None) -> Field[Any]:
+    """Sharpen a field; every kind of domain registers a function of its own. `sharpen` is the public function."""
+    kind = type(field if domain is None else domain).__name__
     raise UnsupportedTypeError(
-        f"a {type(field).__name__} cannot be sharpened", remedy="pass one that SignedHeatSolver.distance returned"
+        f"what lies on a {kind} cannot be sharpened", remedy="pass a field that SignedHeatSolver.distance returned"
     )
 
 
 def sharpened(
-    field: VertexField | TetField,
+    field: Field[FieldDomain],
     discretization: Discretization,
     elements: LinearElements,
     values: Floats,

@@ -14,10 +14,10 @@ from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
 from .errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
-from .field_kinds import Field, to_field, warned
+from .fields.field import Field
+from .fields.solutions import to_field, warned
 from .foreign import ForeignShape, as_list, converted
 from .grids.grid import Dimension, Grid
-from .grids.grid_field import GridField
 from .jobs import Progress, Stopwatch, within
 from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
@@ -28,8 +28,6 @@ from .surfaces.repaired_mesh import RepairedMesh
 from .surfaces.source_segments import given_curves, numbers_kept, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
-from .surfaces.vertex_field import VertexField
-from .tets.tet_field import TetField
 from .tets.tet_mesh import TetMesh
 from .validation import positive_number
 
@@ -149,15 +147,15 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     @overload
     def distance(
         self: SignedHeatSolver[Grid[Dimension]], sources: SpaceSources, constraint: Constraint | None = None
-    ) -> GridField[Dimension]: ...
+    ) -> Field[Grid[Dimension]]: ...
     @overload
     def distance(
         self: SignedHeatSolver[TetMesh], sources: Shapes, constraint: Constraint | None = None
-    ) -> TetField: ...
+    ) -> Field[TetMesh]: ...
     @overload
     def distance(
         self: SignedHeatSolver[AnySurface], sources: CurvesAndPoints, constraint: Constraint | None = None
-    ) -> VertexField[AnySurface]: ...
+    ) -> Field[AnySurface]: ...
     @overload
     def distance(self, sources: Sources, constraint: Constraint | None = None) -> Field: ...
     @public_call
@@ -174,8 +172,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 
         Returns
         -------
-        VertexField, GridField or TetField
-            φ > 0 on the side that the source normals point to (on a surface: to the left of a curve).
+        Field
+            On the domain; φ > 0 on the side that the source normals point to (on a surface: to the left of a curve).
 
         Raises
         ------
@@ -203,7 +201,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     def _distance(self, sources: Sources, constraint: Constraint | None) -> Field:
         if self._repaired is not None:
             repaired, solver = self._repaired
-            return repaired.on_given(cast("VertexField", solver._distance(repaired.on_it(sources), constraint)))
+            return repaired.on_given(cast("Field[Any]", solver._distance(repaired.on_it(sources), constraint)))
         constraint = checked(constraint)
         stopwatch = Stopwatch(self.progress, steps=5)
         with stopwatch("prepare"):
@@ -238,15 +236,15 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     @overload
     def distance_many(
         self: SignedHeatSolver[Grid[Dimension]], sources: Sequence[SpaceSources], constraint: Constraint | None = None
-    ) -> list[GridField[Dimension]]: ...
+    ) -> list[Field[Grid[Dimension]]]: ...
     @overload
     def distance_many(
         self: SignedHeatSolver[TetMesh], sources: Sequence[Shapes], constraint: Constraint | None = None
-    ) -> list[TetField]: ...
+    ) -> list[Field[TetMesh]]: ...
     @overload
     def distance_many(
         self: SignedHeatSolver[AnySurface], sources: Sequence[CurvesAndPoints], constraint: Constraint | None = None
-    ) -> list[VertexField[AnySurface]]: ...
+    ) -> list[Field[AnySurface]]: ...
     @overload
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
     @public_call
@@ -262,7 +260,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 
         Returns
         -------
-        list of VertexField, GridField or TetField
+        list of Field
             The result of `distance` for each, up to rounding. Timings are divided equally among the sources.
 
         Examples
@@ -314,7 +312,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 @overload
 def distance_unwarned(
     solver: SignedHeatSolver[AnySurface], sources: CurvesAndPoints, constraint: Constraint | None
-) -> VertexField[AnySurface]: ...
+) -> Field[AnySurface]: ...
 @overload
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field: ...
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field:

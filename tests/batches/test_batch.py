@@ -97,7 +97,7 @@ def test_another_job_does_everything_again(tmp_path):
     assert sh.batches.run(tmp_path / "ball.ply", out, job, workers=1).skipped == 1
     finer = sh.batches.Job(volume=".npz", resolution=20)
     assert sh.batches.run(tmp_path / "ball.ply", out, finer, workers=1).skipped == 0
-    assert max(sh.read_field(out / "ball.npz").grid.shape) == 20
+    assert max(sh.read_field(out / "ball.npz").domain.shape) == 20
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -147,7 +147,7 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path):
     figures = batch.outcomes[1].figures
     assert figures["surfaces"][0]["distance"] == 0.1 and figures["samples"]["samples"] == 300
     assert figures["info"]["kind"] == "TriangleMesh" and figures["field"]["notes"]["shape_oriented"]
-    field = sh.signed_distance(sh.read(tmp_path / "in1.ply"), sh.read_field(one / "in1.npy").grid)
+    field = sh.signed_distance(sh.read(tmp_path / "in1.ply"), sh.read_field(one / "in1.npy").domain)
     np.testing.assert_array_equal(sh.read_field(one / "in1.npy").values, field.values)
 
 
@@ -415,7 +415,7 @@ def test_constraints_of_plain_fields_give_them_in_batches_too(tmp_path):
     samples.sphere(2).save(source)
     job = sh.batches.Job(volume=".npz", resolution=12, constraint=sh.constraints.EachComponent())
     job(source, tmp_path / "made")
-    grid = sh.read_field(tmp_path / "made.npz").grid
+    grid = sh.read_field(tmp_path / "made.npz").domain
     plain = sh.SignedHeatSolver(grid).distance(sh.read(source), sh.constraints.EachComponent())
     assert np.array_equal(sh.read_field(tmp_path / "made.npz").values, plain.values)
     with pytest.raises(sh.SignedHeatError, match="a band would need"):

@@ -29,7 +29,7 @@ def test_batch_makes_what_is_asked_for_and_says_what_failed(tmp_path, folder, ca
     assert summary["states"] == {"failed": 1, "done": 1} and summary["shapes"] == 2 and summary["skipped"] == 0
     names = {"ball.npz", "ball_samples.npz", "ball_+0.1.ply", "ball_-0.2.ply", "manifest.jsonl"}
     assert {path.name for path in out.iterdir()} == names
-    assert max(sh.read_field(out / "ball.npz").grid.shape) == 16
+    assert max(sh.read_field(out / "ball.npz").domain.shape) == 16
     (folder / "bad.stl").unlink()
     assert main(["batch", str(folder), "-o", str(out), *options]) == 0
     assert "1 done (1 of them before)" in capsys.readouterr().out

@@ -73,7 +73,7 @@ def test_a_grid_of_ones_own_in_the_plane(arcs, capsys):
     out = arcs / "phi.npz"
     own = ["--origin", "-1.5", "-1.25", "--spacing", "0.1", "0.125", "--shape", "31", "21"]
     succeed(capsys, "volume", arcs / "arcs.csv", "-o", out, *own)
-    grid = sh.read_field(out).grid
+    grid = sh.read_field(out).domain
     assert grid.origin.tolist() == [-1.5, -1.25] and grid.shape == (31, 21) and grid.spacing.tolist() == [0.1, 0.125]
 
 
@@ -227,7 +227,7 @@ def test_tets_from_the_command_line(tmp_path, capsys):
     for name, more in (("sharp.vtu", ()), ("plain.vtu", ("--plain",))):
         succeed(capsys, "volume", tmp_path / "ball.stl", *flags, *more, "-o", tmp_path / name)
         fields.append(sh.read_field(tmp_path / name))
-    errors = [np.abs(phi.values - np.linalg.norm(phi.mesh.vertices, axis=1) + 1).mean() for phi in fields]
+    errors = [np.abs(phi.values - np.linalg.norm(phi.domain.vertices, axis=1) + 1).mean() for phi in fields]
     assert errors[0] < 0.6 * errors[1] < 0.02
     succeed(capsys, "contour", tmp_path / "sharp.vtu", "0.1", "-o", tmp_path / "shell.stl")
     assert "open edges             0" in succeed(capsys, "info", tmp_path / "shell.stl")

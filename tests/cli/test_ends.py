@@ -32,7 +32,7 @@ def ball(tmp_path_factory):
 def field(tmp_path_factory):
     """What `info` describes without compiled code."""
     path = tmp_path_factory.mktemp("ends") / "φ.npz"
-    sh.GridField(sh.Grid((0, 0), 1.0, (3, 3)), np.arange(9.0).reshape(3, 3)).save(path)
+    sh.Field(sh.Grid((0, 0), 1.0, (3, 3)), np.arange(9.0).reshape(3, 3)).save(path)
     return path
 
 

@@ -112,10 +112,10 @@ def test_a_band_fills_the_image(voxels, tmp_path):
 def test_images_are_placed_as_the_options_say(voxels, tmp_path, capsys):
     scaled, moved, made = (str(tmp_path / name) for name in ("scaled.npz", "moved.npz", "made.stl"))
     assert main(["volume", str(voxels), "--units", "cm:mm", "-o", scaled]) == 0
-    assert sh.read_field(scaled).grid.upper.tolist() == [240.0, 200.0, 160.0]
+    assert sh.read_field(scaled).domain.upper.tolist() == [240.0, 200.0, 160.0]
     matrix = [str(number) for number in (1, 0, 0, 5, 0, 1, 0, 6, 0, 0, 1, 7)]
     assert main(["volume", str(voxels), "--transform", *matrix, "-o", moved]) == 0
-    assert sh.read_field(moved).grid.origin.tolist() == [5.0, 6.0, 7.0]
+    assert sh.read_field(moved).domain.origin.tolist() == [5.0, 6.0, 7.0]
     assert main(["watertight", str(voxels), "--units", "cm:mm", "-o", made]) == 0
     assert np.ptp(sh.read(made).vertices, axis=0) == pytest.approx(20 * RADIUS, abs=20)
     sheared = [str(number) for number in (1, 1, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0)]

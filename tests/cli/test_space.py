@@ -52,8 +52,8 @@ def test_volume(tmp_path, ball, capsys, ending):
     output = str(tmp_path / f"phi.{ending}")
     summary = json.loads(succeed(capsys, "volume", ball, "-o", output, "--resolution", "32", "--json"))
     phi = sh.read_field(output)
-    assert summary["shape"] == list(phi.grid.shape)
-    assert max(phi.grid.shape) == 32
+    assert summary["shape"] == list(phi.domain.shape)
+    assert max(phi.domain.shape) == 32
     assert abs(phi([[1.2, 0, 0]])[0] - 0.2) < 0.03
     assert phi([[0, 0, 0]])[0] < -0.8
 
@@ -66,7 +66,7 @@ def test_volume_is_sharpened_unless_plain(tmp_path):
     assert main(["volume", ball, "-o", ours, *options]) == 0
     assert main(["volume", ball, "-o", papers, *options, "--plain"]) == 0
     plain = sh.read_field(papers)
-    grid = plain.grid
+    grid = plain.domain
     np.testing.assert_array_equal(plain.values, sh.SignedHeatSolver(grid, diffusion=4.0).distance(sh.read(ball)).values)
     solid = sh.signed_distance(sh.read(ball), grid, diffusion=4.0)
     np.testing.assert_array_equal(sh.read_field(ours).values, solid.values)
@@ -84,7 +84,7 @@ def test_volume_on_a_grid_of_ones_own(tmp_path, ball, capsys):
     output = str(tmp_path / "phi.npz")
     own = ["--origin", "-1.5", "-1.6", "-1.7", "--spacing", "0.2", "0.25", "0.3", "--shape", "16", "14", "12"]
     succeed(capsys, "volume", ball, "-o", output, *own)
-    grid = sh.read_field(output).grid
+    grid = sh.read_field(output).domain
     assert grid.origin.tolist() == [-1.5, -1.6, -1.7]
     assert grid.spacing.tolist() == [0.2, 0.25, 0.3]
     assert grid.shape == (16, 14, 12)
@@ -93,7 +93,7 @@ def test_volume_on_a_grid_of_ones_own(tmp_path, ball, capsys):
 def test_spacing_and_padding(tmp_path, ball, capsys):
     output = str(tmp_path / "phi.npz")
     succeed(capsys, "volume", ball, "-o", output, "--spacing", "0.125", "--padding", "0.5")
-    grid = sh.read_field(output).grid
+    grid = sh.read_field(output).domain
     assert grid.spacing.tolist() == [0.125] * 3
     assert (grid.origin <= -1.5 + 0.05).all()
 
@@ -309,7 +309,7 @@ def test_bands_are_written_and_contoured(tmp_path, ball, capsys):
     assert summary["band"] == 0.2
     assert summary["nodes"] == 512 * summary["blocks"]
     band = sh.read_field(output)
-    assert band.blocks is not None
+    assert band.domain.blocks is not None
     assert abs(band([[1.1, 0, 0]])[0] - 0.1) < 0.02
     succeed(capsys, "contour", output, "0.1", "-o", surface)
     one = sh.read(surface)

@@ -41,7 +41,7 @@ def test_the_finer_solution_is_used():
     assert phi.finest.domain.n_vertices > 50
     assert phi([[3.4, 1.9, 1.0]])[0] > 0.3
     assert len(phi.contour(0.3)) == 1
-    shifted = sh.VertexField(mesh, phi.values + 1.0, finer=phi.finer)
+    shifted = sh.Field(mesh, phi.values + 1.0, finer=phi.finer)
     assert shifted.finest is shifted
 
 

@@ -181,7 +181,7 @@ def test_level_sets_are_measured_to_exactly(build):
     values = mesh.vertices @ [0.3, 0.2, 0.9] - 0.21
     curves = mesh.level_set(values)
     phi = sh.signed_distance(curves, mesh)
-    line = sh.sharpen(sh.VertexField(mesh, values))
+    line = sh.sharpen(sh.Field(mesh, values))
     assert np.abs(phi.values - line.values).max() < 1e-3 * mesh.edge_lengths.mean()
 
 

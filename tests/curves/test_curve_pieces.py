@@ -28,7 +28,7 @@ def pieces(mesh) -> list[sh.Curve]:
     return [circle(mesh, 0.6, k / 6, k / 6 + 5 / 36) for k in range(6)]
 
 
-def taken(field: sh.VertexField) -> tuple[list[int], list[int]]:
+def taken(field: sh.Field) -> tuple[list[int], list[int]]:
     note = field.diagnostics.note(CurvesTaken)
     return ([], []) if note is None else (note.turned, note.left_out)
 

@@ -41,7 +41,7 @@ CASES = {
 }
 
 
-def exact_distance(*arguments, **options) -> sh.PiecewiseField:
+def exact_distance(*arguments, **options) -> sh.Field:
     """Piecewise distance from the exact solution of the linear program."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(piecewise, "minimize", lambda problem, **_: minimize_exactly(problem))
@@ -62,14 +62,14 @@ def test_fast_is_as_good_as_exact(case):
 def test_loop_round_the_tube_is_cut_across_the_tube():
     mesh = torus(n_around=64, n_across=24)
     phi = sh.piecewise_distance(mesh.path(range(24), closed=True), mesh)
-    assert len(phi.cut) == 1
-    cut = phi.cut[0]
+    assert len(phi.domain.cuts(phi.values)) == 1
+    cut = phi.domain.cuts(phi.values)[0]
     assert cut.vertices[0] == cut.vertices[-1]
     assert cut.length == pytest.approx(2 * np.pi * 0.4, rel=0.03)
     assert 2 * np.pi * 0.6 < cut.height < 2 * np.pi * 1.4  # between the ways round the inner and the outer equator
     ring = np.arctan2(*mesh.vertices[cut.vertices, 1::-1].T)
     assert np.abs(ring).min() > 2 * np.pi / 64  # not at the source
-    slope = np.linalg.norm(phi.face_gradients, axis=1)
+    slope = np.linalg.norm(phi.cell_gradients, axis=1)
     assert np.sqrt(np.average((slope - 1) ** 2, weights=mesh.face_areas)) < 0.08
 
 
@@ -77,8 +77,8 @@ def test_source_is_cut_only_where_nothing_else_is_possible():
     mesh = torus(n_around=48, n_across=24)  # the inner equator is the shortest loop of all
     ids = np.arange(48) * 24 + 12
     phi = exact_distance(mesh.path(ids, closed=True), mesh)
-    assert len(phi.cut) == 1
-    assert not np.isin(phi.cut[0].vertices, ids).any()
+    assert len(phi.domain.cuts(phi.values)) == 1
+    assert not np.isin(phi.domain.cuts(phi.values)[0].vertices, ids).any()
 
 
 def test_gradient_is_one_and_source_is_zero():
@@ -86,7 +86,7 @@ def test_gradient_is_one_and_source_is_zero():
     curve = arc(mesh)
     phi = sh.piecewise_distance(curve, mesh, smooth=False)
     spacing = mesh.edge_lengths.mean()
-    assert np.allclose(np.linalg.norm(phi.face_gradients, axis=1), 1)
+    assert np.allclose(np.linalg.norm(phi.cell_gradients, axis=1), 1)
     assert np.abs(phi(curve)).max() < spacing
     assert abs(np.median(phi(curve))) < 0.1 * spacing
 
@@ -98,9 +98,9 @@ def test_bounding_curve_equals_plain_distance():
     circle = mesh.polyline(np.stack([0.9 * np.cos(t), 0.9 * np.sin(t), np.full_like(t, 0.4)], axis=1), closed=True)
     phi = sh.piecewise_distance(circle, mesh)
     notes = phi.diagnostics.note(Jumps)
-    assert notes.continuous and phi.cut == [] and notes.cut_length == 0
+    assert notes.continuous and phi.domain.cuts(phi.values) == [] and notes.cut_length == 0
     plain = sh.SignedHeatSolver(mesh).distance(circle, sh.constraints.Free())
-    split = phi.split()
+    split = phi.expand()
     assert split.domain.n_vertices == mesh.n_vertices
     at_vertices = np.empty(mesh.n_vertices)
     at_vertices[mesh.faces] = split.values[split.domain.faces]
@@ -131,7 +131,7 @@ def test_reversal_changes_the_sign():
     curve = mesh.path(range(20), closed=True)
     forth, back = (exact_distance(c, mesh, smooth=False) for c in (curve, curve.reversed()))
     assert forth.diagnostics.note(Jumps).objective == pytest.approx(back.diagnostics.note(Jumps).objective, rel=1e-9)
-    assert np.allclose(forth.face_gradients, -back.face_gradients)
+    assert np.allclose(forth.cell_gradients, -back.cell_gradients)
 
 
 def test_scale():
@@ -148,7 +148,7 @@ def test_inconsistently_oriented_curve():
     halves = [mesh.polyline(np.stack([np.cos(t), s * np.sin(t), 0 * t], axis=1)) for s in (1, -1)]
     phi = sh.piecewise_distance(halves, mesh)
     assert not phi.diagnostics.note(Jumps).continuous
-    ends = np.concatenate([c.points for c in phi.cut])
+    ends = np.concatenate([c.points for c in phi.domain.cuts(phi.values)])
     assert min(np.linalg.norm(ends - [1, 0, 0], axis=1).min(), np.linalg.norm(ends - [-1, 0, 0], axis=1).min()) < 0.5
     for side in (1, -1):
         vertex = np.argmin(np.linalg.norm(mesh.vertices - [0, 0.8 * side, 0.6], axis=1))
@@ -169,8 +169,8 @@ def test_quads():
     right, up = np.roll(ids, -1, axis=0), np.roll(ids, -1, axis=1)
     quads = np.stack([ids, right, np.roll(right, -1, axis=1), up], axis=-1).reshape(-1, 4)
     phi = sh.piecewise_distance(sh.PolygonMesh(mesh.vertices, quads).path(ids[0]), sh.PolygonMesh(mesh.vertices, quads))
-    assert phi.surface.n_faces == 4 * len(quads)
-    assert phi.cut[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.05)
+    assert phi.domain.triangulation.n_faces == 4 * len(quads)
+    assert phi.domain.cuts(phi.values)[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.05)
 
 
 def test_intrinsic_triangulation_equals_the_mesh():
@@ -192,10 +192,10 @@ def test_intrinsic_triangulation_equals_the_mesh():
     assert np.abs(plain(middle) - intrinsic(middle)).max() < 1e-6
     assert np.abs(plain.gradient(middle) - intrinsic.gradient(middle)).max() < 1e-4
     assert intrinsic.diagnostics.note(Jumps).cut_length == pytest.approx(plain.diagnostics.note(Jumps).cut_length)
-    split = intrinsic.split()
-    assert split.domain.n_vertices == plain.split().domain.n_vertices
+    split = intrinsic.expand()
+    assert split.domain.n_vertices == plain.expand().domain.n_vertices
     with refused(sh.errors.GeometryError):
-        _ = intrinsic.face_gradients
+        _ = intrinsic.cell_gradients
 
 
 def bad(mesh: sh.TriangleMesh) -> sh.TriangleMesh:
@@ -216,8 +216,8 @@ def test_intrinsic_triangulation_of_a_bad_mesh(refine, tmp_path):
     assert phi.diagnostics.note(Jumps).gap < 0.002
     # One loop round the tube, of circumference 0.8 π, with a twig or two at bad triangles. It sits where triangles are
     # longest, and there the way round, from 1.2 π to 2.8 π, is measured with an error of a triangle or so.
-    assert 0.97 * 0.8 * np.pi < sum(cut.length for cut in phi.cut) < 1.3 * 0.8 * np.pi
-    assert sum(cut.height * cut.length for cut in phi.cut) / (0.8 * np.pi) > 1.2 * np.pi - 0.5
+    assert 0.97 * 0.8 * np.pi < sum(cut.length for cut in phi.domain.cuts(phi.values)) < 1.3 * 0.8 * np.pi
+    assert sum(cut.height * cut.length for cut in phi.domain.cuts(phi.values)) / (0.8 * np.pi) > 1.2 * np.pi - 0.5
     assert np.abs(phi(curve)).max() < mesh.edge_lengths.mean()
     step = 1e-6 * np.array([-1.0, 0.5, 0.5])  # so short that hardly any leads into another triangle
     here, there = (
@@ -225,9 +225,9 @@ def test_intrinsic_triangulation_of_a_bad_mesh(refine, tmp_path):
     )
     risen = phi.gradient(here) * np.einsum("k,fkd->fd", step, mesh.vertices[mesh.faces])
     assert np.median(np.abs(risen.sum(axis=1) - (phi(there) - phi(here)))) < 1e-10
-    split = phi.split()  # flat, in space, cut open, with slope one
+    split = phi.expand()  # flat, in space, cut open, with slope one
     assert split.domain.triangulation.face_areas.sum() == pytest.approx(mesh.face_areas.sum(), rel=1e-6)
-    slope = np.linalg.norm(split.face_gradients, axis=1)
+    slope = np.linalg.norm(split.cell_gradients, axis=1)
     area = split.domain.triangulation.face_areas
     assert np.sqrt(np.average((slope - 1) ** 2, weights=area)) < 1.001 * phi.diagnostics.note(Jumps).integration_error
     assert np.ptp(split.values) == pytest.approx(np.ptp(phi.values), rel=0.05)  # means at vertices
@@ -246,7 +246,7 @@ def test_unoriented_curve_across_faces(kind):
     if kind == "polygons":
         curve = domain.polyline(np.stack([np.cos(t), np.sin(t), 0.03 + 0 * t], axis=1), oriented=False)
     phi = sh.piecewise_distance(curve, domain)
-    assert isinstance(phi.domain, sh.IntrinsicTriangulation)
+    assert isinstance(phi.domain.surface, sh.IntrinsicTriangulation)
     assert np.abs(phi(curve)).max() < mesh.edge_lengths.mean()  # at its ends, where slopes turn
     poles = domain.points_at([int(np.argmin(np.linalg.norm(mesh.vertices - [0, 0, s], axis=1))) for s in (1, -1)])
     # Truth is π/2 ∓ 0.03. The plain field errs by 0.17, for t = h² and an arc of one radian.
@@ -256,10 +256,12 @@ def test_unoriented_curve_across_faces(kind):
 def test_smoothing_takes_small_jumps_away_and_leaves_the_cut():
     mesh, curve = CASES["round the tube"]()
     rough, smooth = (sh.piecewise_distance(curve, mesh, smooth=smooth) for smooth in (False, True))
-    small = np.abs(rough.jumps)[~rough.is_cut]
+    small = np.abs(rough.domain.jumps(rough.values))[~rough.domain.is_cut]
     assert small.max() > 1e-3
-    assert np.abs(smooth.jumps)[~smooth.is_cut].max() < 1e-12
-    assert [c.length for c in smooth.cut] == pytest.approx([c.length for c in rough.cut])
+    assert np.abs(smooth.domain.jumps(smooth.values))[~smooth.domain.is_cut].max() < 1e-12
+    assert [c.length for c in smooth.domain.cuts(smooth.values)] == pytest.approx(
+        [c.length for c in rough.domain.cuts(rough.values)]
+    )
     assert np.abs(smooth.values - rough.values).max() < 2 * mesh.edge_lengths.mean()
 
 
@@ -267,7 +269,7 @@ def test_smooth_is_step_three():
     mesh = sphere(3)
     circle = mesh.level_set(mesh.vertices[:, 2], 0.3)
     plain = sh.SignedHeatSolver(mesh, intrinsic=False, diffusion=1.0).distance(circle, sh.constraints.Free()).values
-    smooth = sh.piecewise_distance(circle, mesh, intrinsic=False).split()
+    smooth = sh.piecewise_distance(circle, mesh, intrinsic=False).expand()
     assert np.ptp(smooth.values[smooth.domain.faces] - plain[mesh.faces]) < 1e-4
 
 
@@ -288,8 +290,9 @@ def test_smooth_is_nearer_to_the_way_along_a_moebius_strip():
 def test_save_and_contour_show_the_jump(tmp_path):
     mesh, curve = CASES["round the tube"]()
     phi = sh.piecewise_distance(curve, mesh)
-    split = phi.split()
-    assert split.domain.n_vertices == mesh.n_vertices + len(phi.cut[0].vertices) - 1  # the closed cut, doubled
+    split = phi.expand()
+    (cut,) = phi.domain.cuts(phi.values)  # closed, and doubled
+    assert split.domain.n_vertices == mesh.n_vertices + len(cut.vertices) - 1
     assert np.array_equal(split.domain.vertices[split.domain.faces], mesh.vertices[mesh.faces])
     lines = phi.contour(0.0)
     assert np.abs(phi(lines[0])).max() < mesh.edge_lengths.mean()
@@ -306,7 +309,7 @@ def test_parts_without_source_are_nan():
         phi = sh.piecewise_distance(both.path(range(20), closed=True), both)
     assert np.isnan(phi.values[mesh.n_faces :]).all() and np.isfinite(phi.values[: mesh.n_faces]).all()
     assert np.array_equal(phi.diagnostics.unreached, np.arange(mesh.n_faces, 2 * mesh.n_faces))
-    assert len(phi.cut) == 1
+    assert len(phi.domain.cuts(phi.values)) == 1
 
 
 def test_single_face():
@@ -421,7 +424,7 @@ def test_a_cut_spread_over_many_edges_is_no_continuity(n_around):
     """Round the tube of a torus all cuts cost the same, on the way to the solution φ jumps a little everywhere."""
     mesh = torus(n_around=n_around, n_across=24)
     phi = sh.piecewise_distance(mesh.path(range(24), closed=True), mesh)
-    assert len(phi.cut) == 1 and phi.diagnostics.note(Jumps).gap < 0.01
+    assert len(phi.domain.cuts(phi.values)) == 1 and phi.diagnostics.note(Jumps).gap < 0.01
 
 
 def test_triangles_on_which_slopes_mean_nothing_are_told():
@@ -448,7 +451,7 @@ def test_line_along_a_cylinder_is_distance_on_the_strip_cut_open():
     """φ is the way round, with one straight cut from rim to rim, at which it falls by all of the way round."""
     mesh = cylinder(64, 32)
     phi = sh.piecewise_distance(mesh.path(range(32)), mesh)
-    (cut,) = phi.cut
+    (cut,) = phi.domain.cuts(phi.values)
     around = 64 * 2 * np.sin(np.pi / 64)
     assert cut.length == pytest.approx(2.0)
     assert np.allclose(cut.jumps, around, rtol=0.01)
@@ -469,12 +472,12 @@ def test_bad_triangles_are_retriangulated():
     mesh = sheared(torus(n_around=48, n_across=16))
     loop = mesh.level_set(mesh.vertices[:, 0] + 0.1 * mesh.vertices[:, 2], 0.1)[0]  # one of the two
     phi, rough = (sh.piecewise_distance(loop, mesh, intrinsic=i) for i in ("auto", False))
-    assert isinstance(phi.domain, sh.IntrinsicTriangulation)
-    assert not isinstance(rough.domain, sh.IntrinsicTriangulation)
+    assert isinstance(phi.domain.surface, sh.IntrinsicTriangulation)
+    assert not isinstance(rough.domain.surface, sh.IntrinsicTriangulation)
     errors = [field.diagnostics.note(Jumps).integration_error for field in (phi, rough)]
     assert errors[0] < 0.7 * errors[1]
-    assert len(phi.cut) == 1
-    assert phi.cut[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.1)
+    assert len(phi.domain.cuts(phi.values)) == 1
+    assert phi.domain.cuts(phi.values)[0].length == pytest.approx(2 * np.pi * 0.4, rel=0.1)
 
 
 def test_unoriented_curve_along_edges_of_bad_triangles():
@@ -483,7 +486,7 @@ def test_unoriented_curve_along_edges_of_bad_triangles():
     ids = np.arange(16) + 160
     curve = mesh.path(ids, oriented=False)
     phi = sh.piecewise_distance(curve, mesh)
-    assert isinstance(phi.domain, sh.IntrinsicTriangulation)
+    assert isinstance(phi.domain.surface, sh.IntrinsicTriangulation)
     assert np.abs(phi(mesh.points_at(ids))).max() < 0.5 * mesh.edge_lengths.mean()
     assert phi(mesh.points_at((ids + 384) % 768)).min() > 1.0
 

@@ -27,10 +27,10 @@ def sides(gap):
 def test_a_whole_drawing_is_exact(resolution):
     square = sh.Polyline(SQUARE, closed=True)
     field = sh.signed_distance(square, resolution=resolution)
-    np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (-1, -1), (1, 1)), atol=1e-12)
-    back = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.grid)
+    np.testing.assert_allclose(field.values, distance_to_box(field.domain.points, (-1, -1), (1, 1)), atol=1e-12)
+    back = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.domain)
     np.testing.assert_allclose(back.values, field.values, atol=1e-12)
-    turned = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.grid, as_oriented=True)
+    turned = sh.signed_distance(sh.Polyline(SQUARE[::-1], closed=True), field.domain, as_oriented=True)
     away = np.abs(field.values) > 1e-9
     np.testing.assert_allclose(turned.values[away], -field.values[away], atol=1e-12)
     points = np.random.default_rng(0).uniform(-3, 3, (50, 4, 2))
@@ -109,7 +109,7 @@ def test_offsets_of_a_drawing_are_exact():
 
 def test_a_drawing_with_gaps_is_exact_where_it_is_there():
     field = sh.signed_distance(sides(0.1), resolution=97)
-    exact, points = distance_to_box(field.grid.points, (-1, -1), (1, 1)), field.grid.points
+    exact, points = distance_to_box(field.domain.points, (-1, -1), (1, 1)), field.domain.points
     beside = (np.abs(points).min(axis=-1) < 0.5) & (np.abs(exact) < 0.4)
     np.testing.assert_allclose(field.values[beside], exact[beside], atol=1e-12)
     assert np.abs(field.values - exact).max() < 0.2  # corners are cut off by less than the gaps
@@ -158,7 +158,7 @@ def test_a_ring_is_a_ring_whatever_it_misses(gone, begin, way):
     [outline] = field.offset(1.0)
     assert abs(abs(outline.signed_area) - (12 * 8 - 4 + np.pi)) < (0.2 if gone < 0.1 else 16)
     if gone < 1e-9:
-        np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (0, 0), (10, 6)), atol=1e-9)
+        np.testing.assert_allclose(field.values, distance_to_box(field.domain.points, (0, 0), (10, 6)), atol=1e-9)
 
 
 @pytest.mark.parametrize("ways", [(1, 1, 1, 1), (1, -1, 1, -1), (-1, -1, -1, 1)])
@@ -167,14 +167,14 @@ def test_lines_that_close_together_are_filled(ways):
     lines = [side if way > 0 else side.reversed() for side, way in zip(sides(0.0), ways, strict=True)]
     for given in (lines, lines[::-1], [*lines, lines[2], lines[0].reversed()]):
         field = sh.signed_distance(given, resolution=24)
-        np.testing.assert_allclose(field.values, distance_to_box(field.grid.points, (-1, -1), (1, 1)), atol=1e-12)
+        np.testing.assert_allclose(field.values, distance_to_box(field.domain.points, (-1, -1), (1, 1)), atol=1e-12)
         assert field.diagnostics.note(OutlinesFilled).outlines == 1
 
 
 def test_lines_drawn_there_and_back_are_no_outline():
     line = np.array([[0.0, 0.0], [1.0, 0.2], [2.0, 0.0]])
     one = sh.signed_distance(sh.Polyline(line), resolution=24)
-    twice = sh.signed_distance([sh.Polyline(line), sh.Polyline(line + 1e-13)], one.grid)
+    twice = sh.signed_distance([sh.Polyline(line), sh.Polyline(line + 1e-13)], one.domain)
     np.testing.assert_allclose(twice.values, one.values, atol=1e-7)  # the gap times the slope of heat beyond the ends
 
 
@@ -208,7 +208,7 @@ def test_outlines_that_share_lines_are_filled_by_turns(angle):
     boxes = [np.array([a, [b[0], a[1]], b, [a[0], b[1]]]) for a, b in zip(low, high, strict=True)]
     lines = [sh.Polyline(box @ turn + [0.3, 0.7], closed=True) for box in boxes]
     field = sh.signed_distance(lines, resolution=32, fill="evenodd")
-    places = (field.grid.points - [0.3, 0.7]) @ turn.T
+    places = (field.domain.points - [0.3, 0.7]) @ turn.T
     inside = ((places[..., None, :] > low) & (places[..., None, :] < high)).all(axis=-1).sum(axis=-1) % 2 == 1
     clear = np.abs(field.values) > 1e-9
     np.testing.assert_array_equal((field.values < 0)[clear], inside[clear])
@@ -236,9 +236,9 @@ def test_what_was_done_with_strokes_is_noted_and_may_be_refused():
     assert note.turned == [1]
     assert note.left_out == [4]
     assert note.share_left_out == pytest.approx(0.07, abs=0.02) and "of the length" in str(note)
-    np.testing.assert_array_equal(field.values, sh.signed_distance(sides(0.1), field.grid).values)
-    assert sh.signed_distance([*lines, scribble], field.grid, as_oriented=True)([[0.0, 0.9]]) > 0
-    kept = sh.signed_distance([*sides(0.1), scribble], field.grid, every_piece=True)
+    np.testing.assert_array_equal(field.values, sh.signed_distance(sides(0.1), field.domain).values)
+    assert sh.signed_distance([*lines, scribble], field.domain, as_oriented=True)([[0.0, 0.9]]) > 0
+    kept = sh.signed_distance([*sides(0.1), scribble], field.domain, every_piece=True)
     assert abs(kept([scribble.points[1]])) < 0.05
 
 
@@ -259,7 +259,9 @@ def drawing():
 def test_a_drawing_is_completed_alike_wherever_distance_is_asked(side, drawing):
     lines, everywhere = drawing
     grid = sh.Grid.around([[0.7, 0.7], [0.7 + side, 0.7 + side]], 19, padding=0.0)  # at, and around, a missing corner
-    inside = (grid.points >= everywhere.grid.origin).all(axis=-1) & (grid.points <= everywhere.grid.upper).all(axis=-1)
+    inside = (grid.points >= everywhere.domain.origin).all(axis=-1) & (grid.points <= everywhere.domain.upper).all(
+        axis=-1
+    )
     field = sh.signed_distance(lines, grid)
     np.testing.assert_allclose(field.values[inside], everywhere(grid.points[inside]), atol=0.03)
     np.testing.assert_allclose(field.values, distance_to_box(grid.points, (-1, -1), (1, 1)), atol=0.15)

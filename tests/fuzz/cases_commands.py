@@ -210,10 +210,10 @@ def _files_beside(random: Random, folder: Path) -> None:
     grid = sh.Grid([-1.0, -1.0, -1.0], 0.5, [5, 5, 5])
     values = np.linalg.norm(grid.points.reshape(*grid.shape, 3), axis=-1) - 0.7
     for ending in ("npz", "vti", "npy"):
-        sh.GridField(grid, values * one_of(random, SIZES)).save(folder / f"field.{ending}")
+        sh.Field(grid, values * one_of(random, SIZES)).save(folder / f"field.{ending}")
     plane = sh.Grid([0.0, 0.0], 1.0, [4, 5])
-    sh.GridField(plane, random.normal(size=(4, 5))).save(folder / "plane.npz")
-    sh.VertexField(ball, ball.vertices[:, 0]).save(folder / "on_ball.npz")
+    sh.Field(plane, random.normal(size=(4, 5))).save(folder / "plane.npz")
+    sh.Field(ball, ball.vertices[:, 0]).save(folder / "on_ball.npz")
     sh.TetMesh(np.eye(4)[:, :3], [[0, 1, 2, 3]]).save(folder / "tets.mesh")
 
 
@@ -290,8 +290,8 @@ def _values(field: Any) -> np.ndarray:
     if getattr(field, "blocks", None) is None:
         return np.asarray(field.values)
     steps = np.moveaxis(np.indices((8, 8, 8)), 0, -1)
-    nodes = 8 * field.blocks.places[:, None, None, None] + steps
-    return np.asarray(field.values[(nodes < field.grid.shape).all(axis=-1)])
+    nodes = 8 * field.domain.blocks.places[:, None, None, None] + steps
+    return np.asarray(field.values[(nodes < field.domain.shape).all(axis=-1)])
 
 
 def _judge_file(path: Path, told: str) -> None:

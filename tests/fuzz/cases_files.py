@@ -75,7 +75,7 @@ SQUARES = sh.DigitalSurface(np.ones((2, 2, 2), dtype=bool)).squares
 CLOUD = sh.PointCloud(BALL.vertices, BALL.vertices)
 TETS = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], [[0, 1, 2, 3], [1, 2, 3, 4]])
 GRID = sh.Grid([0.0, 0.0, 0.0], [0.5, 0.5, 0.25], [3, 4, 5])
-FIELD = sh.GridField(GRID, np.random.default_rng(0).normal(size=GRID.shape))
+FIELD = sh.Field(GRID, np.random.default_rng(0).normal(size=GRID.shape))
 CURVES = [BALL.path([0, 1]), sh.SurfacePoints([0, 1], [[0.2, 0.3, 0.5], [0, 0, 1]])]
 
 
@@ -180,7 +180,7 @@ def fields() -> list[Files]:
     head, _, values = raw.partition(b"\n\n")
     packed = {name: head.replace(b"raw", name.encode()) + b"\n\n" for name in ("gzip", "bzip2", "ascii")}
     numbers = " ".join(map(str, FIELD.values.ravel(order="F").tolist())).encode()
-    on_ball = sh.VertexField(BALL, BALL.vertices[:, 0])
+    on_ball = sh.Field(BALL, BALL.vertices[:, 0])
     apart = head + b"\ndata file: field.raw\n\n"
     return [
         *[written(FIELD.save, f"field.{ending}") for ending in ("npz", "vti", "nrrd")],
@@ -263,7 +263,7 @@ def volumes() -> list[Files]:
     """Voxels."""
     voxels = np.zeros((3, 3, 3), dtype=np.uint8)
     voxels[1, 1, 1] = 1
-    field = sh.GridField(sh.Grid([0, 0, 0], 1, voxels.shape), voxels.astype(float))
+    field = sh.Field(sh.Grid([0, 0, 0], 1, voxels.shape), voxels.astype(float))
     array = written(lambda path: np.save(path, voxels), "voxels.npy")
     return [array, *[written(field.save, f"voxels.{ending}") for ending in ("vti", "nrrd")]]
 
@@ -280,7 +280,7 @@ def labels() -> list[Files]:
         {"labels.nrrd": head.format("raw").encode() + values.tobytes()},
         {"labels.nrrd": head.format("gzip").encode() + gzip.compress(values.tobytes(), mtime=0)},
         written(lambda path: np.save(path, image), "labels.npy"),
-        written(sh.GridField(sh.Grid([0, 0, 0], 1, image.shape), image.astype(float)).save, "labels.vti"),
+        written(sh.Field(sh.Grid([0, 0, 0], 1, image.shape), image.astype(float)).save, "labels.vti"),
     ]
     with suppress(ImportError):
         import nibabel

@@ -233,10 +233,10 @@ def check_piecewise(given: Subject) -> str:
     smooth = chance(random, 0.7)
     phi, warned = announced(lambda: sh.piecewise_distance(sources, domain, smooth=smooth))
     judge(phi.values, warned, length_of_edges(embedded(domain)))
-    for cut in phi.cut:
+    for cut in phi.domain.cuts(phi.values):
         judge(cut.points, False, np.inf, "cut")
     if smooth:
-        if (np.abs(phi.jumps)[~phi.is_cut] > 0).any():
+        if (np.abs(phi.domain.jumps(phi.values))[~phi.domain.is_cut] > 0).any():
             raise Wrong("jumps off the cut")
     return "distance"
 

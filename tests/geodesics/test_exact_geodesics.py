@@ -97,7 +97,7 @@ def test_a_search_that_is_cut_short_warns():
     faces = np.array([rng.choice(6, 3, replace=False) for _ in range(300)])
     mesh = sh.TriangleMesh(rng.normal(size=(6, 3)), faces)
     with pytest.warns(sh.errors.InexactWarning):
-        sharp = sh.sharpen(sh.VertexField(mesh, rng.normal(size=6)))
+        sharp = sh.sharpen(sh.Field(mesh, rng.normal(size=6)))
     assert sharp.diagnostics.note(sh.diagnostics.GeodesicWindows).cut_short
 
 

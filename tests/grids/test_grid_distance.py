@@ -68,7 +68,7 @@ def test_sharpening_keeps_signs_and_changes_nothing_it_measured():
     field = sh.sharpen(sh.SignedHeatSolver(box(48)).distance(BROKEN["holes"]))
     again = sh.sharpen(field)
     assert ((field.values > 0) == (again.values > 0)).all()
-    assert rms(again.values - field.values) < 0.02 * field.grid.spacing[0]
+    assert rms(again.values - field.values) < 0.02 * field.domain.spacing[0]
 
 
 def test_anisotropic_spacing_and_any_origin():
@@ -204,7 +204,7 @@ def test_sides_that_coincide_are_told_and_refused_when_nothing_is_left():
     )
     field = sh.SignedHeatSolver(sh.Grid.around(thin, 32)).distance(thin)
     assert 0.99 < field.diagnostics.note(SampledSource).area_cancelled < 1
-    outside = np.abs(field.grid.points[..., 2]) > 0.1
+    outside = np.abs(field.domain.points[..., 2]) > 0.1
     assert (field.values[outside] > 0).all()
     twice = sh.TriangleMesh(thin.vertices, np.concatenate([thin.faces, thin.faces[:, ::-1]]))
     with refused(sh.errors.SourceError):
@@ -226,5 +226,5 @@ def test_what_cannot_be_done_is_refused_with_the_remedy():
     with refused(sh.errors.MemoryLimitError):
         sh.SignedHeatSolver(sh.Grid.around(shape, 20000)).distance(shape)
     with refused(sh.errors.OutsideError, "values"):
-        sh.sharpen(sh.GridField(box(8), np.ones((8, 8, 8))))
+        sh.sharpen(sh.Field(box(8), np.ones((8, 8, 8))))
     assert memory_estimate(box(512)) < 10e9

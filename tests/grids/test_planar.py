@@ -22,7 +22,7 @@ SQUARE = sh.Polyline([[-1, -1], [-1, 1], [1, 1], [1, -1]], closed=True)
 
 
 def away_from(field):
-    return np.linalg.norm(field.grid.points, axis=-1) - 1
+    return np.linalg.norm(field.domain.points, axis=-1) - 1
 
 
 def rms(values):
@@ -42,17 +42,17 @@ def test_distance_to_a_circle_converges():
     errors = []
     for n in sizes:
         phi = sh.SignedHeatSolver(sh.Grid.around(circle(8 * n), n)).distance(circle(8 * n))
-        assert max(phi.grid.shape) == n and phi.grid.dimension == 2
-        assert rms(phi.values - away_from(phi)) < 0.25 * phi.grid.spacing[0]
+        assert max(phi.domain.shape) == n and phi.domain.dimension == 2
+        assert rms(phi.values - away_from(phi)) < 0.25 * phi.domain.spacing[0]
         errors.append(rms(sh.sharpen(phi).values - away_from(phi)))
     assert -np.polyfit(np.log(sizes), np.log(errors), 1)[0] > 1.7
 
 
 def test_distance_to_a_square():
     phi = sh.sharpen(sh.SignedHeatSolver(sh.Grid.around(SQUARE, 128)).distance(SQUARE))
-    error = phi.values - distance_to_box(phi.grid.points, (-1, -1), (1, 1))
-    assert rms(error) < 0.3 * phi.grid.spacing[0]
-    assert np.abs(error).max() < 1.0 * phi.grid.spacing[0]
+    error = phi.values - distance_to_box(phi.domain.points, (-1, -1), (1, 1))
+    assert rms(error) < 0.3 * phi.domain.spacing[0]
+    assert np.abs(error).max() < 1.0 * phi.domain.spacing[0]
 
 
 def test_broken_and_doubled_circles():
@@ -116,10 +116,10 @@ def test_a_sphere_in_four_dimensions():
     phi = sh.SignedHeatSolver(sh.Grid.around(sh.PointCloud(points, normals=points), 12, padding=0.4)).distance(
         sh.PointCloud(points, normals=points)
     )
-    assert phi.grid.dimension == 4
-    assert rms(phi.values - away_from(phi)) < 0.1 * phi.grid.spacing[0]
+    assert phi.domain.dimension == 4
+    assert rms(phi.values - away_from(phi)) < 0.1 * phi.domain.spacing[0]
     assert phi([[0.7, 0.7, 0.7, 0.7]])[0] == pytest.approx(0.4, abs=0.02)
-    assert rms(sh.sharpen(phi).values - away_from(phi)) < 0.1 * phi.grid.spacing[0]
+    assert rms(sh.sharpen(phi).values - away_from(phi)) < 0.1 * phi.domain.spacing[0]
 
 
 def test_lines_of_equal_distance_are_oriented_and_close():
@@ -128,7 +128,7 @@ def test_lines_of_equal_distance_are_oriented_and_close():
     assert line.closed and line.signed_area < 0
     np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), 1.15, atol=1e-3)
     assert line.length == pytest.approx(2 * np.pi * 1.15, rel=1e-3)
-    again = sh.SignedHeatSolver(phi.grid).distance(line)  # oriented so that φ grows to the left
+    again = sh.SignedHeatSolver(phi.domain).distance(line)  # oriented so that φ grows to the left
     assert again([[0, 0]])[0] < 0 < again([[1.4, 0]])[0]
     [out] = phi.offset(-0.5)
     assert -out.signed_area == pytest.approx(np.pi * 0.25, rel=2e-3)
@@ -157,7 +157,7 @@ def test_field_in_the_plane(tmp_path):
         phi.save(tmp_path / f"phi.{ending}")
         again = sh.read_field(tmp_path / f"phi.{ending}")
         np.testing.assert_array_equal(again.values, phi.values)
-        np.testing.assert_array_equal(again.grid.origin, phi.grid.origin)
+        np.testing.assert_array_equal(again.domain.origin, phi.domain.origin)
     view.save_slices(phi, tmp_path / "phi.png", [circle()], [0.2])
     assert matplotlib.image.imread(tmp_path / "phi.png")[..., :3].std() > 0.05
 
@@ -170,7 +170,7 @@ def test_boolean_images():
     assert sum(-line.signed_area for line in lines) == pytest.approx(np.pi * (0.49 + 0.36), rel=0.01)
     phi = sh.SignedHeatSolver(sh.Grid.around(lines, 96)).distance(lines)
     exact = np.minimum(
-        *(np.hypot(phi.grid.points[..., 0] - a, phi.grid.points[..., 1]) - r for a, r in ((-0.8, 0.7), (0.8, 0.6)))
+        *(np.hypot(phi.domain.points[..., 0] - a, phi.domain.points[..., 1]) - r for a, r in ((-0.8, 0.7), (0.8, 0.6)))
     )
     assert rms(phi.values - exact) < 0.03
     [border] = sh.Polyline.from_mask(np.ones((3, 3), dtype=bool))  # what meets the border of the image is closed
@@ -219,4 +219,4 @@ def test_points_in_the_plane_need_no_grid():
     points = circle(60).points
     cloud = sh.PointCloud(points, points)
     alone = sh.signed_distance(cloud, resolution=40)
-    assert np.array_equal(alone.values, sh.signed_distance(cloud, alone.grid).values)
+    assert np.array_equal(alone.values, sh.signed_distance(cloud, alone.domain).values)

@@ -156,7 +156,7 @@ def test_what_has_no_distance_is_refused(values, options):
 def test_sharpening_fields_without_a_shape_is_the_same():
     grid = sh.Grid((-1, -1, -1), 0.125, (17, 17, 17))
     signs = np.where(ball(np.moveaxis(grid.points, -1, 0), 0.61) < 0, -1.0, 1.0)
-    np.testing.assert_array_equal(sh.sharpen(sh.GridField(grid, signs)).values, sh.redistance(signs, 0.125))
+    np.testing.assert_array_equal(sh.sharpen(sh.Field(grid, signs)).values, sh.redistance(signs, 0.125))
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

@@ -15,19 +15,19 @@ FORMATS = ["npz", "npy", "nrrd", "vti"]
 def field(dimension=3):
     shape = (3, 4, 5)[:dimension]
     grid = sh.Grid((0.1 + 0.2, -1e7 / 3, 1e-9)[:dimension], (0.1, 1 / 3, np.pi)[:dimension], shape)
-    return sh.GridField(grid, np.random.default_rng(1).normal(size=shape))
+    return sh.Field(grid, np.random.default_rng(1).normal(size=shape))
 
 
 @pytest.mark.parametrize("ending", ["npz", "vti"])
 def test_confidence_comes_back(tmp_path, ending):
     phi = field()
-    told = sh.GridField(phi.grid, phi.values, confidence=np.linspace(0, 1, phi.values.size).reshape(phi.values.shape))
+    told = sh.Field(phi.domain, phi.values, confidence=np.linspace(0, 1, phi.values.size).reshape(phi.values.shape))
     told.save(tmp_path / f"phi.{ending}")
     back = read_field(tmp_path / f"phi.{ending}")
     np.testing.assert_array_equal(back.values, phi.values)
     np.testing.assert_array_equal(back.confidence, told.confidence)
     with refused(sh.errors.GeometryError, element="confidence"):
-        sh.GridField(phi.grid, phi.values, confidence=np.ones(3))
+        sh.Field(phi.domain, phi.values, confidence=np.ones(3))
 
 
 def test_npz_needs_no_pickle_and_says_what_it_holds(tmp_path):
@@ -40,7 +40,7 @@ def test_npz_needs_no_pickle_and_says_what_it_holds(tmp_path):
 def test_npy_has_its_transform_beside_it(tmp_path):
     field().save(tmp_path / "phi.npy")
     about = json.loads((tmp_path / "phi.json").read_text())
-    assert about["spacing"] == field().grid.spacing.tolist()
+    assert about["spacing"] == field().domain.spacing.tolist()
     assert sorted(p.name for p in tmp_path.iterdir()) == ["phi.json", "phi.npy"]
 
 
@@ -51,7 +51,7 @@ def test_vtk_reads_our_vti_with_the_same_axes(tmp_path):
     phi.save(tmp_path / "phi.vti")
     image = pyvista.read(tmp_path / "phi.vti")
     values = np.asarray(image.point_data["signed_distance"])
-    nodes = phi.grid.points.reshape(-1, 3)
+    nodes = phi.domain.points.reshape(-1, 3)
     order = [image.FindPoint(node) for node in nodes]
     np.testing.assert_array_equal(values[order], phi.values.ravel())
     np.testing.assert_allclose(np.asarray(image.points)[order], nodes, rtol=1e-14, atol=1e-12)
@@ -65,7 +65,7 @@ def test_we_read_vti_of_vtk(tmp_path, mode, compressor):
     from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
 
     phi = field()
-    image = pyvista.ImageData(dimensions=phi.grid.shape, spacing=phi.grid.spacing, origin=phi.grid.origin)
+    image = pyvista.ImageData(dimensions=phi.domain.shape, spacing=phi.domain.spacing, origin=phi.domain.origin)
     image.point_data["values"] = phi.values.ravel(order="F")
     writer = vtkXMLImageDataWriter()
     writer.SetInputData(image)
@@ -75,7 +75,7 @@ def test_we_read_vti_of_vtk(tmp_path, mode, compressor):
     writer.Write()
     back = read_field(tmp_path / "a.vti")
     np.testing.assert_array_equal(back.values, phi.values)
-    np.testing.assert_allclose(back.grid.spacing, phi.grid.spacing, rtol=1e-5)
+    np.testing.assert_allclose(back.domain.spacing, phi.domain.spacing, rtol=1e-5)
 
 
 def test_nrrd_is_read_by_its_own_library_with_the_same_axes(tmp_path):
@@ -84,7 +84,7 @@ def test_nrrd_is_read_by_its_own_library_with_the_same_axes(tmp_path):
     phi.save(tmp_path / "phi.nrrd")
     values, header = nrrd.read(str(tmp_path / "phi.nrrd"), index_order="F")
     np.testing.assert_array_equal(values, phi.values)
-    np.testing.assert_array_equal(np.diag(header["space directions"]), phi.grid.spacing)
+    np.testing.assert_array_equal(np.diag(header["space directions"]), phi.domain.spacing)
 
 
 def test_nrrd_along_turned_axes_is_refused(tmp_path):
@@ -121,7 +121,7 @@ def test_files_that_hold_no_field_are_refused(tmp_path):
 
 
 def test_fields_of_four_dimensions_fit_npz_only(tmp_path):
-    phi = sh.GridField(sh.Grid((0, 0, 0, 0), 1.0, (2, 3, 2, 4)), np.arange(48.0).reshape(2, 3, 2, 4))
+    phi = sh.Field(sh.Grid((0, 0, 0, 0), 1.0, (2, 3, 2, 4)), np.arange(48.0).reshape(2, 3, 2, 4))
     phi.save(tmp_path / "phi.npz")
     np.testing.assert_array_equal(read_field(tmp_path / "phi.npz").values, phi.values)
     with refused(sh.errors.FileFormatError):
@@ -146,7 +146,7 @@ def test_bands_in_another_order_of_bytes(tmp_path):
     with np.load(tmp_path / "band.npz") as file:
         arrays = dict(file)
     np.savez(tmp_path / "band.npz", **arrays | {"values": arrays["values"].astype(">f8")})
-    points = band.grid.points.reshape(-1, 3)[::50]
+    points = band.domain.points.reshape(-1, 3)[::50]
     np.testing.assert_array_equal(read_field(tmp_path / "band.npz")(points), band(points))
 
 

@@ -84,7 +84,7 @@ def test_new_files_obey_the_mask(tmp_path):
     before = os.umask(0o077)
     try:
         sh.save(BALL, tmp_path / "ball.stl")
-        sh.GridField(sh.Grid([0, 0], 1.0, [2, 2]), np.eye(2)).save(tmp_path / "phi.nrrd")
+        sh.Field(sh.Grid([0, 0], 1.0, [2, 2]), np.eye(2)).save(tmp_path / "phi.nrrd")
     finally:
         os.umask(before)
     assert {stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()} == {0o600}
@@ -192,7 +192,7 @@ def test_no_more_is_unpacked_than_is_announced(tmp_path, ending):
 
 @pytest.mark.parametrize("ending", ["vti", "nrrd", "npy"])
 def test_what_is_announced_is_compared_with_the_memory_that_is_free(tmp_path, ending, monkeypatch):
-    field = sh.GridField(sh.Grid([0, 0, 0], 1.0, [40, 40, 40]), np.zeros((40, 40, 40)))
+    field = sh.Field(sh.Grid([0, 0, 0], 1.0, [40, 40, 40]), np.zeros((40, 40, 40)))
     field.save(tmp_path / f"phi.{ending}")
     monkeypatch.setattr(budgets, "available_memory", lambda: 8 * 40**3 - 1)
     with pytest.raises(sh.errors.MemoryLimitError) as caught:

@@ -103,7 +103,7 @@ def test_spaces_are_turned_between_formats(tmp_path, labels):
     mask = tmp_path / "mask.nrrd"
     write_nrrd(mask, labels, AXES["turned"])
     image = sh.io.read_labels(mask)
-    field = sh.GridField(image.grid, np.ones(image.grid.shape))
+    field = sh.Field(image.grid, np.ones(image.grid.shape))
     image.save(field, tmp_path / "phi.nii")
     affine = nibabel.load(tmp_path / "phi.nii").affine
     flip = np.diag([-1.0, -1, 1])  # left-posterior-superior to right-anterior-superior
@@ -123,7 +123,7 @@ def test_straight_images_can_be_saved_as_any_field(tmp_path, labels):
     write_nrrd(mask, labels, AXES["straight"])
     assert main(["volume", str(mask), "--label", "3", "-o", str(output), "--quiet"]) == 0
     field = sh.read_field(output)
-    np.testing.assert_allclose(field.grid.origin, ORIGIN)
+    np.testing.assert_allclose(field.domain.origin, ORIGIN)
     assert field([ORIGIN + STEPS * CENTER])[0] < -1.2
 
 

@@ -54,13 +54,13 @@ def test_polygons(folder, ending, seed, sides):
 def test_fields_on_grids(folder, ending, seed, shape, scale):
     rng, dimension = np.random.default_rng(seed), len(shape)
     grid = sh.Grid(scale * rng.normal(size=dimension), scale * rng.uniform(0.1, 1, dimension), shape)
-    field = sh.GridField(grid, scale * rng.normal(size=shape))
+    field = sh.Field(grid, scale * rng.normal(size=shape))
     field.save(folder / f"field.{ending}")
     back = sh.read_field(folder / f"field.{ending}")
     np.testing.assert_array_equal(back.values, field.values)
-    np.testing.assert_array_equal(back.grid.origin, grid.origin)
-    np.testing.assert_array_equal(back.grid.spacing, grid.spacing)
-    assert back.grid.shape == grid.shape
+    np.testing.assert_array_equal(back.domain.origin, grid.origin)
+    np.testing.assert_array_equal(back.domain.spacing, grid.spacing)
+    assert back.domain.shape == grid.shape
 
 
 @given(data=st.data(), mesh=meshes, closed=st.booleans())

@@ -21,7 +21,7 @@ DOMAINS = {
 def test_values_and_vertices_come_back(tmp_path, name, ending):
     domain = DOMAINS[name]
     n = len(domain.points if name == "points" else domain.vertices)
-    field = sh.VertexField(domain, np.random.default_rng(0).normal(size=n))
+    field = sh.Field(domain, np.random.default_rng(0).normal(size=n))
     field.save(tmp_path / f"phi.{ending}")
     back = sh.read_field(tmp_path / f"phi.{ending}")
     assert type(back.domain) is type(domain) and np.array_equal(back.values, field.values)
@@ -29,7 +29,7 @@ def test_values_and_vertices_come_back(tmp_path, name, ending):
 
 def test_clouds_come_back_with_what_their_triangles_are_made_of(tmp_path):
     cloud = sh.PointCloud(SQUARE, normals=5 * [[0, 0, 1]], areas=np.arange(1.0, 6), n_neighbors=4)
-    sh.VertexField(cloud, np.zeros(5)).save(tmp_path / "phi.npz")
+    sh.Field(cloud, np.zeros(5)).save(tmp_path / "phi.npz")
     back = sh.read_field(tmp_path / "phi.npz").domain
     assert back.n_neighbors == 4 and np.array_equal(back.normals, cloud.normals)
     assert np.array_equal(back.areas, cloud.areas)

@@ -6,7 +6,7 @@ import scipy
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.field_levels import on_level
+from signedheat.grids.exact_levels import on_level
 from signedheat.grids.marching import closed_surface
 from signedheat.mesh.edges import edge_table
 from signedheat.mesh.triangles import CREASE_ANGLE, flipped_along_creases
@@ -38,7 +38,7 @@ def field():
 def test_the_crease_between_two_balls_has_no_teeth(field):
     """Around the circle at which the two offsets meet the surface bends by their angle, and teeth bend more."""
     made = field.contour(0.3)
-    grid = field.grid
+    grid = field.domain
     points, faces = closed_surface(field.values, grid.spacing, 0.3)
     toothed = sh.TriangleMesh(on_level(field.solid.distance, points, field.values, grid, 0.3), faces)
     assert np.array_equal(toothed.vertices, made.vertices)

@@ -95,7 +95,7 @@ def test_arrays_have_edges_too():
     np.testing.assert_array_equal(sh.contour(values, CUBE, gradient=slopes).vertices, exact.vertices)
     sharp, cut = (sh.contour(values, CUBE, sharp=each) for each in (True, False))
     assert_closed_and_manifold(sharp)
-    field = sh.GridField(sh.Grid((-1, -1, -1), 2 / 30, (31, 31, 31)), values)
+    field = sh.Field(sh.Grid((-1, -1, -1), 2 / 30, (31, 31, 31)), values)
     assert abs(sharp.to_trimesh().volume - true) < 0.2 * abs(field.contour().to_trimesh().volume - true)
     assert abs(sharp.to_trimesh().volume - true) < abs(cut.to_trimesh().volume - true)
 

@@ -24,7 +24,7 @@ def turned(mesh):
 
 def contoured(values, extent, n=36):
     grid = sh.Grid(-np.array(extent), 2 * max(extent) / n, np.ceil(np.array(extent) / max(extent) * n).astype(int) + 1)
-    return sh.GridField(grid, values(grid.points)).contour(0.0)
+    return sh.Field(grid, values(grid.points)).contour(0.0)
 
 
 def holed_plate():
@@ -220,6 +220,6 @@ def test_far_between_points_nothing_is_missing():
     """300 points on a ball, ten cells apart: its inside is solid, and it was taken for sheets."""
     cloud = samples.oriented_points(samples.sphere(5), 300)
     field = sh.signed_distance(cloud, resolution=96)
-    truth = np.linalg.norm(field.grid.points, axis=-1) - 1.0
+    truth = np.linalg.norm(field.domain.points, axis=-1) - 1.0
     assert np.sqrt(np.mean((field.values - truth) ** 2)) < 0.02
     assert field.diagnostics.note(sh.diagnostics.BoundsNothing) is None

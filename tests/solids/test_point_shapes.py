@@ -10,10 +10,10 @@ from signedheat import samples
 BALL = samples.sphere(2)
 SOLID = sh.complete(BALL)
 EXACT = SOLID.field(resolution=12)
-FIELD = sh.GridField(EXACT.grid, EXACT.values, confidence=EXACT.confidence)
+FIELD = sh.Field(EXACT.domain, EXACT.values, confidence=EXACT.confidence)
 BAND = SOLID.field(spacing=0.04, band=0.1)
-TETS = sh.TetField(sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), np.arange(4.0))
-SURFACE = sh.VertexField(BALL, BALL.vertices[:, 2])
+TETS = sh.Field(sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]), np.arange(4.0))
+SURFACE = sh.Field(BALL, BALL.vertices[:, 2])
 
 QUERIES = {
     "solid distance": (SOLID.distance, ()),

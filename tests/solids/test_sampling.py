@@ -128,7 +128,7 @@ def taken_below(taken):
 
 
 def test_what_cannot_be_sampled_says_so(tmp_path, box):
-    plain = sh.GridField(box.grid, box.values)
+    plain = sh.Field(box.domain, box.values)
     with pytest.raises(sh.errors.SourceError) as caught:
         sh.sample_distances(plain, 10)
     assert "signed_distance" in caught.value.remedy

@@ -13,7 +13,7 @@ from signedheat.solids.completion import scatter_of
 @pytest.mark.parametrize(("resolution", "padding"), [(16, 5.25), (24, 2.0), (32, 0.3)])
 def test_a_ball_of_a_few_cells(resolution, padding):
     field = sh.signed_distance(samples.sphere(3), resolution=resolution, padding=padding)
-    exact = np.linalg.norm(field.grid.points, axis=-1) - 1
+    exact = np.linalg.norm(field.domain.points, axis=-1) - 1
     assert (np.sign(field.values) == np.sign(exact)).all()
     assert np.abs(field.values - exact).max() < 0.03
 

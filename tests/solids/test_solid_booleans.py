@@ -101,7 +101,7 @@ def test_sheets_take_no_part():
 
 def test_with_fields_they_are_fields():
     ball, cube = sh.complete(samples.sphere(3)), sh.complete(box((0, 0, 0), (2, 2, 2)))
-    field, nodes = ball.field(resolution=16), cube.field(grid=ball.field(resolution=16).grid)
+    field, nodes = ball.field(resolution=16), cube.field(grid=ball.field(resolution=16).domain)
     for mixed, fields in (
         (field | cube, field | nodes),
         (cube | field, field | nodes),

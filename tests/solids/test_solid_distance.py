@@ -43,7 +43,8 @@ def offset_is_clear(field, mesh, distance):
 def test_a_box_is_exact():
     """Twelve faces, far larger than a cell: distance is that of the box to rounding, at edges and corners too."""
     field = signed_distance(box((-1, -0.5, -0.3), (1, 0.5, 0.3)), resolution=48)
-    assert np.abs(field.values - distance_to_boxes(field.grid.points, [((-1, -0.5, -0.3), (1, 0.5, 0.3))])).max() < 1e-6
+    exact = distance_to_boxes(field.domain.points, [((-1, -0.5, -0.3), (1, 0.5, 0.3))])
+    assert np.abs(field.values - exact).max() < 1e-6
 
 
 @pytest.mark.parametrize("fraction", [0.1, 0.5, 1.0])
@@ -65,19 +66,19 @@ def test_bodies_unite():
     ]
     shape = samples.union(*(box(*each) for each in boxes))
     field = signed_distance(shape, resolution=64)
-    truth = distance_to_boxes(field.grid.points, boxes)
-    deep = np.abs(truth) > 2 * field.grid.spacing[0]
+    truth = distance_to_boxes(field.domain.points, boxes)
+    deep = np.abs(truth) > 2 * field.domain.spacing[0]
     assert np.array_equal((field.values < 0)[deep], (truth < 0)[deep])
-    assert np.abs(field.values - truth)[truth > 0].max() < 0.5 * field.grid.spacing[0]
+    assert np.abs(field.values - truth)[truth > 0].max() < 0.5 * field.domain.spacing[0]
     assert field.diagnostics.note(LeftOut).covered_faces == 24
-    kept = signed_distance(shape, field.grid, keep_overlaps=True)
+    kept = signed_distance(shape, field.domain, keep_overlaps=True)
     assert kept.diagnostics.note(LeftOut) is None
 
 
 def test_cavities_stay():
     shell = samples.union(samples.sphere(3), turned(samples.sphere(3, radius=0.5)))
     field = signed_distance(shell, resolution=48)
-    radius = np.linalg.norm(field.grid.points, axis=-1)
+    radius = np.linalg.norm(field.domain.points, axis=-1)
     truth = np.maximum(radius - 1, 0.5 - radius)
     assert error(field, truth) < 0.5
 
@@ -87,8 +88,8 @@ def test_half_a_sphere_is_carried_on():
     ball = samples.sphere(4)
     left = only(ball, ball.vertices[ball.faces][:, :, 0].mean(axis=1) < 0)
     field = signed_distance(left, Grid.around(ball.bounds, 48))
-    radius = np.linalg.norm(field.grid.points, axis=-1)
-    flat = np.where(field.grid.points[..., 0] < 0, radius - 1, np.hypot(field.grid.points[..., 0], radius - 1))
+    radius = np.linalg.norm(field.domain.points, axis=-1)
+    flat = np.where(field.domain.points[..., 0] < 0, radius - 1, np.hypot(field.domain.points[..., 0], radius - 1))
     assert error(field, radius - 1) < 0.5 * 100 * np.sqrt(np.mean((flat - radius + 1) ** 2)) / np.ptp(radius)
     told = field.diagnostics.note(CompletedArea)
     assert 0.25 < told.completed_share < 0.6
@@ -109,17 +110,17 @@ def test_patches_are_completed_within_the_surface():
     ball = samples.sphere(4)
     holed = samples.without_patches(ball, 6, 0.45)
     field = signed_distance(holed, Grid.around(ball.bounds, 48))
-    truth = np.linalg.norm(field.grid.points, axis=-1) - 1
+    truth = np.linalg.norm(field.domain.points, axis=-1) - 1
     caps = 1 - np.cos(0.45)  # how far flat caps lie inside; on a fifth of the surface, and as deep below it
     assert error(field, truth) < 100 * caps * np.sqrt(0.2) / np.ptp(truth)
-    far = np.abs(truth) > 3 * field.grid.spacing[0]
+    far = np.abs(truth) > 3 * field.domain.spacing[0]
     assert np.array_equal((field.values < 0)[far], (truth < 0)[far])
 
 
 def test_a_sheet_has_no_inside():
     flat = sheet([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     field = signed_distance(flat, resolution=40)
-    x, y, z = np.moveaxis(np.abs(field.grid.points), -1, 0)
+    x, y, z = np.moveaxis(np.abs(field.domain.points), -1, 0)
     away = np.linalg.norm([np.maximum(x - 1, 0), np.maximum(y - 1, 0), z], axis=0)
     assert np.abs(field.values - away).max() < 1e-6
     assert field.diagnostics.note(BoundsNothing).open_area == 1.0
@@ -143,7 +144,7 @@ def test_furniture():
     shape = samples.union(*legs, *boards)
     field = signed_distance(shape, resolution=64, padding=0.4)
     assert (field([[x, y, -0.5] for x in (-0.8, 0.8) for y in (-0.5, 0.5)]) < 0).all()
-    p = field.grid.points
+    p = field.domain.points
     outside = (np.abs(p) > [1.2, 0.7, 1]).any(axis=-1)
     assert (field.values[outside] < 0).mean() < 1e-3
     assert offset_is_clear(field, shape, 0.1) < 0.01
@@ -163,14 +164,14 @@ def test_polygons_points_and_several_meshes():
         [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]],
     )
     field = signed_distance(cube, resolution=32)
-    assert np.abs(field.values - distance_to_boxes(field.grid.points, [((0, 0, 0), (1, 1, 1))])).max() < 1e-6
+    assert np.abs(field.values - distance_to_boxes(field.domain.points, [((0, 0, 0), (1, 1, 1))])).max() < 1e-6
     two = signed_distance([cube, box((2, 0, 0), (3, 1, 1))], resolution=32)
     assert two([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]]) == pytest.approx(
         [-0.5, 0.5, -0.5], abs=0.1
     )  # a cell is .135
     cloud = samples.oriented_points(samples.sphere(3), 1000)
     points = signed_distance(cloud, resolution=24)
-    assert error(points, np.linalg.norm(points.grid.points, axis=-1) - 1) < 0.7
+    assert error(points, np.linalg.norm(points.domain.points, axis=-1) - 1) < 0.7
     with refused(SourceError, "source 1"):
         signed_distance([cube, cloud], resolution=32)
 
@@ -209,8 +210,8 @@ def test_points_on_a_plate_thinner_than_a_cell_invent_no_solid():
     flat[:, 2] = np.where(np.arange(2000) % 2, 1, -1) * half[2]
     normals = np.stack([np.zeros(2000), np.zeros(2000), np.sign(flat[:, 2])], axis=1)
     field = signed_distance(PointCloud(flat @ turn.T, normals @ turn.T), resolution=36)
-    truth = distance_to_boxes(field.grid.points @ turn, [(-half, half)])
-    cell = field.grid.spacing[0]
+    truth = distance_to_boxes(field.domain.points @ turn, [(-half, half)])
+    cell = field.domain.spacing[0]
     assert not (field.values[truth > 2 * cell] < 0).any()
     assert np.abs(np.abs(field.values) - np.abs(truth)).max() < 4 * cell  # at the rim, where φ still tells sides
 

@@ -49,7 +49,7 @@ def solid(request):
 
 
 def assert_exact(field, solid):
-    exact = solid.distance(field.grid.points.reshape(-1, 3)).reshape(field.values.shape)
+    exact = solid.distance(field.domain.points.reshape(-1, 3)).reshape(field.values.shape)
     rounding = 1e-12 * float(np.ptp(solid.bounds, axis=0).max())
     np.testing.assert_allclose(field.values, exact, rtol=0, atol=rounding)
 
@@ -86,8 +86,8 @@ def test_places_between_nodes_are_exact_too(solid):
     np.testing.assert_array_equal(field(points), solid.distance(points))
     closest = field.closest(points)
     np.testing.assert_allclose(closest.points + closest.distances[:, None] * field.gradient(points), points, atol=1e-12)
-    off = np.abs(field.interpolate(points) - field(points))[field.grid.contains(points)]
-    assert 0 < off.max() < np.linalg.norm(field.grid.spacing)
+    off = np.abs(field.interpolate(points) - field(points))[field.domain.contains(points)]
+    assert 0 < off.max() < np.linalg.norm(field.domain.spacing)
 
 
 @pytest.mark.parametrize("level", [0.0, 0.11, -0.11])
@@ -96,7 +96,7 @@ def test_contours_lie_on_the_level(level):
     field = solid.field(resolution=30)
     surface = field.contour(level)
     assert_closed_manifold(surface)
-    off = np.abs(solid.distance(surface.vertices) - level) / field.grid.spacing[0]
+    off = np.abs(solid.distance(surface.vertices) - level) / field.domain.spacing[0]
     assert np.quantile(off, 0.99) < 2e-3  # but for the few points that marching cubes puts inside cells
     assert off.max() < 0.5
 
@@ -122,7 +122,7 @@ def test_moves_with_the_solid():
 def test_confidence_is_that_of_the_nearest_triangle():
     solid = complete(cup())
     field = solid.field(resolution=24)
-    points = field.grid.points.reshape(-1, 3)
+    points = field.domain.points.reshape(-1, 3)
     confidence, found = field.confidence.ravel(), solid.closest(points)
     low = found.points[:, 2] < 0.1
     assert (confidence[low] == 1.0).all() and (found.confidence[low] == 1.0).all() and confidence.min() < 0.7
@@ -150,44 +150,44 @@ def test_what_cannot_fit_is_refused_before_it_is_allocated():
 
 def assert_same_nodes(band, whole):
     """Where a band has a node, it has the value of the whole grid; and all nodes as near as its width are there."""
-    held = np.full(whole.grid.shape, np.nan)
-    for place, block in zip(band.blocks.places * 8, band.values, strict=True):
-        a, b, c = (slice(p, min(p + 8, n)) for p, n in zip(place, whole.grid.shape, strict=True))
+    held = np.full(whole.domain.shape, np.nan)
+    for place, block in zip(band.domain.blocks.places * 8, band.values, strict=True):
+        a, b, c = (slice(p, min(p + 8, n)) for p, n in zip(place, whole.domain.shape, strict=True))
         held[a, b, c] = block[: a.stop - a.start, : b.stop - b.start, : c.stop - c.start]
     there = ~np.isnan(held)
     np.testing.assert_array_equal(held[there], whole.values[there].astype(np.float32))
-    assert there[np.abs(whole.values) <= band.width].all()
+    assert there[np.abs(whole.values) <= band.domain.width].all()
 
 
 def test_bands_are_the_whole_grid_near_the_surface(solid):
     whole = solid.field(resolution=50)
-    band = solid.field(grid=whole.grid, band=2.5 * float(whole.grid.spacing[0]))
+    band = solid.field(grid=whole.domain, band=2.5 * float(whole.domain.spacing[0]))
     assert_same_nodes(band, whole)
     points = np.random.default_rng(2).uniform(solid.bounds[0] - 0.2, solid.bounds[1] + 0.2, (200, 3))
     np.testing.assert_array_equal(band(points), whole(points))
-    near = np.abs(band(points)) < 0.5 * band.width
+    near = np.abs(band(points)) < 0.5 * band.domain.width
     np.testing.assert_allclose(band.interpolate(points[near]), whole.interpolate(points[near]), atol=1e-6)
-    dense = band.dense()
+    dense = band.expand()
     assert (np.sign(dense.values) == np.sign(whole.values)).mean() > 0.98
 
 
 def test_contours_of_bands_are_those_of_whole_grids():
     solid = complete(SHAPES["holes"]())
     whole = solid.field(resolution=44)
-    band = solid.field(grid=whole.grid, band=4 * float(whole.grid.spacing[0]))
-    for level in (0.0, 0.9 * band.width, -band.width):
+    band = solid.field(grid=whole.domain, band=4 * float(whole.domain.spacing[0]))
+    for level in (0.0, 0.9 * band.domain.width, -band.domain.width):
         ours, theirs = band.offset(level), whole.contour(level)
         assert_closed_manifold(ours)
         assert (ours.n_vertices, ours.n_faces) == (theirs.n_vertices, theirs.n_faces)
         np.testing.assert_allclose(np.sort(ours.vertices, axis=0), np.sort(theirs.vertices, axis=0), atol=1e-5)
     with refused(sh.errors.OutsideError):
-        band.contour(1.1 * band.width)
+        band.contour(1.1 * band.domain.width)
 
 
 def test_grids_are_as_asked_for_or_have_128_nodes_along_the_longest_side():
     solid = complete(SHAPES["brick"]())
-    assert max(solid.field().grid.shape) == 128 and max(solid.field(resolution=9).grid.shape) == 9
-    padded = solid.field(spacing=0.15, padding=0.4).grid
+    assert max(solid.field().domain.shape) == 128 and max(solid.field(resolution=9).domain.shape) == 9
+    padded = solid.field(spacing=0.15, padding=0.4).domain
     assert (padded.spacing == 0.15).all() and (padded.origin <= solid.bounds[0] - 0.4).all()
     for name, value in (("resolution", 9), ("spacing", 0.1), ("padding", 1.0)):
         with refused(sh.errors.UnsupportedTypeError, element=name):
@@ -198,14 +198,14 @@ def test_stores_hold_the_same_bits_whoever_computes_them(tmp_path):
     solid = complete(SHAPES["two bodies"]())
     options = {"resolution": 80, "band": 0.05}
     band = solid.field(**options)
-    assert band.n_nodes < 0.4 * band.grid.n_nodes
+    assert band.values.size < 0.4 * band.domain.n_nodes
     by_threads = solid.field(**options, store=tmp_path / "new" / "threads")
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
         by_processes = solid.field(**options, store=tmp_path / "processes", scheduler=pool)
     for stored in (by_threads, by_processes):
         np.testing.assert_array_equal(stored.values, band.values)
         np.testing.assert_array_equal(stored.confidence, band.confidence)
-        np.testing.assert_array_equal(stored.blocks.places, band.blocks.places)
+        np.testing.assert_array_equal(stored.domain.blocks.places, band.domain.blocks.places)
 
 
 def test_options_of_stores_need_a_store(tmp_path):
@@ -239,7 +239,7 @@ def test_bands_survive_files(tmp_path):
     band.save(tmp_path / "band.npz")
     again = sh.read_field(tmp_path / "band.npz")
     np.testing.assert_array_equal(again.values, band.values)
-    assert again.width == band.width
+    assert again.domain.width == band.domain.width
     points = np.random.default_rng(3).uniform(-1, 1, (100, 3))
     np.testing.assert_array_equal(again(points), band(points))
     np.testing.assert_array_equal(again.closest(points).distances, band(points))

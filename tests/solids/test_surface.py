@@ -115,7 +115,7 @@ def test_edges_that_cut_creases_off_are_divided(monkeypatch):
 def test_the_offset_of_a_field_is_the_surface_in_its_cells_to_the_last_bit():
     solid = sh.complete(samples.with_noise(samples.torus(n_around=48, n_across=24), 0.01, seed=1))
     field = solid.field(resolution=80)
-    offset, surface = field.offset(0.05), sharp_surface(Offset(solid, 0.05), field.grid)
+    offset, surface = field.offset(0.05), sharp_surface(Offset(solid, 0.05), field.domain)
     np.testing.assert_array_equal(offset.vertices, surface.vertices)
     np.testing.assert_array_equal(offset.faces, surface.faces)
 

@@ -207,7 +207,7 @@ def test_volumes_come_from_files(tmp_path):
     plain = sh.read(tmp_path / "plain.npy")
     assert (plain.volume == volume).all() and (plain.spacing == 1).all() and (plain.origin == 0).all()
     for name in ("image.nrrd", "image.vti", "image.npy"):
-        sh.GridField(grid, volume.astype(float)).save(tmp_path / name)
+        sh.Field(grid, volume.astype(float)).save(tmp_path / name)
         surface = sh.read(tmp_path / name)
         assert (surface.volume == volume).all()
         assert surface.spacing == pytest.approx([spacing] * 3) and surface.origin == pytest.approx(origin)

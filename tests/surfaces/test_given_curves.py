@@ -196,4 +196,4 @@ def test_masks_are_not_ignored():
     with refused(sh.errors.GeometryError):
         sh.signed_distance((BALL.vertices, np.ma.masked_equal(BALL.faces, 3)), resolution=8)
     with refused(sh.errors.GeometryError):
-        sh.VertexField(BALL, hidden[:, 0])
+        sh.Field(BALL, hidden[:, 0])

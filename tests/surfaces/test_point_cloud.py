@@ -10,7 +10,7 @@ import signedheat as sh
 from refusals import refused
 from shapes import domain_cases as cases
 from signedheat.diagnostics import PointsLeftOut
-from signedheat.field_kinds import spread
+from signedheat.fields.solutions import spread
 from signedheat.samples import sphere
 from signedheat.solids.point_orientation import orient_points
 from signedheat.surfaces import point_cloud

@@ -18,7 +18,7 @@ def field_on_sphere(subdivisions=4):
 
 def test_values_between_vertices_are_linear():
     mesh = square(9, 0.3)
-    phi = sh.VertexField(mesh, mesh.vertices @ np.array([2.0, -1.0, 0.0]))
+    phi = sh.Field(mesh, mesh.vertices @ np.array([2.0, -1.0, 0.0]))
     curve = mesh.polyline([[-0.8, -0.7, 0], [0.3, 0.9, 0], [0.6, -0.2, 0]])
     exact = positions(mesh, curve) @ np.array([2.0, -1.0, 0.0])
     assert phi(curve) == pytest.approx(exact, abs=1e-14)
@@ -31,7 +31,7 @@ def test_values_between_vertices_are_linear():
 def test_gradients_are_tangent_unit_and_grow_like_the_field():
     phi = field_on_sphere()
     mesh = phi.domain
-    gradient = phi.face_gradients
+    gradient = phi.cell_gradients
     centers = mesh.vertices[mesh.faces].mean(axis=1)
     assert np.abs(np.einsum("ij,ij->i", gradient, mesh.face_area_vectors)).max() < 1e-14
     away = np.abs(centers[:, 2]) < 0.8
@@ -57,7 +57,7 @@ def test_contours_close_and_round_trip_through_the_solver():
 
 def test_contours_are_the_same_lines_when_faces_are_turned_over():
     phi = field_on_sphere(3)
-    turned = sh.VertexField(flipped(phi.domain), phi.values)
+    turned = sh.Field(flipped(phi.domain), phi.values)
     (a,), (b,) = phi.contour(0.3), turned.contour(0.3)
     assert b.closed and a.n_points == b.n_points
     first = positions(phi.domain, a)
@@ -143,13 +143,13 @@ def test_a_refined_field_is_linear_on_its_pieces():
     mesh = sh.TriangleMesh(vertices, np.concatenate([np.c_[a, a + 1, a + 5], np.c_[a, a + 5, a + 4]]))
     curve = mesh.polyline([[2.2, 0, 0], [2.9, 1, 0.87]])
     phi = sh.SignedHeatSolver(mesh, intrinsic=True).distance(curve)
-    pieces = phi.subdivided()
+    pieces = phi.expand()
     assert len(pieces.values) > mesh.n_vertices
     np.testing.assert_allclose(pieces.values[: mesh.n_vertices], phi.values, atol=1e-12)
     weights = np.random.default_rng(0).dirichlet(np.ones(3), 200)
     points = np.einsum("pk,pkd->pd", weights, mesh.vertices[mesh.faces[np.arange(200) % 6]])
     np.testing.assert_allclose(pieces(points), phi(points), atol=1e-9)
-    assert pieces.subdivided() is pieces
+    assert pieces.expand() is pieces
 
 
 def slab():
@@ -188,19 +188,19 @@ def test_sets_of_regions_keep_the_finer_triangles():
     crossings = np.concatenate([positions(plate, curve) for curve in between.contour()])
     flat = crossings[crossings[:, 1] < 1]
     assert np.abs(np.abs(flat[:, 0] - 4.5) - 1.5).max() < 0.1
-    other = sh.VertexField(plate, left.values)
+    other = sh.Field(plate, left.values)
     assert (left | other).finer is not None and (other | other).finer is None
 
 
 def test_values_are_one_number_for_each_vertex():
     """As of fields on grids and tets: lists and whole numbers are taken, and anything else is refused."""
     mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    phi = sh.VertexField(mesh, [0, 1, 2, 3])
+    phi = sh.Field(mesh, [0, 1, 2, 3])
     assert phi([0.5, 0.5, 0.0]) == pytest.approx(1.0)
     assert (-phi).values.tolist() == [0, -1, -2, -3]
-    assert (phi | sh.VertexField(mesh, np.arange(3, -1, -1))).values.tolist() == [0, 1, 1, 0]
+    assert (phi | sh.Field(mesh, np.arange(3, -1, -1))).values.tolist() == [0, 1, 1, 0]
     for wrong in (np.zeros(3), np.zeros(5), np.zeros((4, 1)), ["a"] * 4, [1j] * 4):
         with refused(sh.errors.GeometryError, "values"):
-            sh.VertexField(mesh, wrong)
+            sh.Field(mesh, wrong)
     with refused(sh.errors.UnsupportedTypeError, "domain"):
-        sh.VertexField(sh.Grid(0.0, 1.0, 4), np.zeros(4))
+        sh.Field(mesh.vertices, np.zeros(4))

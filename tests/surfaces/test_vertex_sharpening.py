@@ -164,7 +164,7 @@ def test_convex_method_mends_a_long_diffusion():
     ended = sharp.diagnostics.note(ConvexRounds)
     assert error(sharp.values, exact) < 0.25 * error(plain.values, exact)
     assert ended.residual <= 2e-3 and ended.rounds <= 200
-    excess = np.maximum(np.linalg.norm(sharp.face_gradients, axis=1) - 1, 0)
+    excess = np.maximum(np.linalg.norm(sharp.cell_gradients, axis=1) - 1, 0)
     assert np.sqrt(np.average(excess**2, weights=mesh.face_areas)) <= 2e-3  # no more than the residual
     assert np.abs(sharp(mesh.level_set(exact, 0.0)[0])).max() < 1e-5
 
@@ -182,9 +182,9 @@ def test_convex_method_leaves_an_exact_distance_alone():
 def test_polygons_and_scale():
     mesh = disk(800)
     values = 0.5 - np.linalg.norm(mesh.vertices, axis=1)
-    sharp = sh.sharpen(sh.VertexField(mesh, values**3 + values))
+    sharp = sh.sharpen(sh.Field(mesh, values**3 + values))
     polygons = sh.PolygonMesh(1000 * mesh.vertices, mesh.faces)
-    scaled = sh.sharpen(sh.VertexField(polygons, values**3 + values))
+    scaled = sh.sharpen(sh.Field(polygons, values**3 + values))
     assert np.allclose(scaled.values, 1000 * sharp.values, rtol=1e-6, atol=1e-3)
 
 
@@ -195,7 +195,7 @@ def test_quads():
     quads = np.stack([ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]], axis=-1).reshape(-1, 4)
     mesh = sh.PolygonMesh(np.stack([x, y, 0 * x], axis=1), quads)
     line = 0.6 * x + 0.8 * y - 0.03
-    assert np.abs(sh.sharpen(sh.VertexField(mesh, 3 * line)).values - line)[np.hypot(x, y) < 0.7].max() < 1e-6
+    assert np.abs(sh.sharpen(sh.Field(mesh, 3 * line)).values - line)[np.hypot(x, y) < 0.7].max() < 1e-6
 
 
 def test_unreached_parts_stay_unknown():
@@ -204,13 +204,13 @@ def test_unreached_parts_stay_unknown():
         np.concatenate([mesh.vertices, mesh.vertices + 5]), np.concatenate([mesh.faces, mesh.faces + mesh.n_vertices])
     )
     values = np.concatenate([mesh.vertices[:, 2], np.full(mesh.n_vertices, np.nan)])
-    sharp = sh.sharpen(sh.VertexField(both, values))
+    sharp = sh.sharpen(sh.Field(both, values))
     assert np.isfinite(sharp.values[: mesh.n_vertices]).all() and np.isnan(sharp.values[mesh.n_vertices :]).all()
 
 
 def test_values_that_are_zero_at_vertices():
     mesh = torus(n_around=40, n_across=20)
-    sharp = sh.sharpen(sh.VertexField(mesh, mesh.vertices[:, 2]))  # zero all along two loops of vertices
+    sharp = sh.sharpen(sh.Field(mesh, mesh.vertices[:, 2]))  # zero all along two loops of vertices
     assert np.abs(sharp.values[np.abs(mesh.vertices[:, 2]) < 1e-12]).max() < 1e-6
     assert np.isfinite(sharp.values).all()
 
@@ -218,7 +218,7 @@ def test_values_that_are_zero_at_vertices():
 def test_one_sign_is_refused():
     mesh = sphere(2)
     with refused(sh.errors.OutsideError):
-        sh.sharpen(sh.VertexField(mesh, 1 + mesh.vertices[:, 2] ** 2))
+        sh.sharpen(sh.Field(mesh, 1 + mesh.vertices[:, 2] ** 2))
 
 
 def segment_distance(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -282,7 +282,7 @@ def test_sources_without_sides_on_other_domains():
 def test_convex_method_needs_a_source():
     mesh = sphere(2)
     with refused(sh.errors.SourceError):
-        sh.sharpen(sh.VertexField(mesh, mesh.vertices[:, 2]), method=sh.methods.Convex())
+        sh.sharpen(sh.Field(mesh, mesh.vertices[:, 2]), method=sh.methods.Convex())
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from signedheat.tets.tet_discretization import memory_estimate, uphill_roots
-from signedheat.tets.tet_field import manifold
+from signedheat.tets.tet_levels import manifold
 
 
 def test_two_tets_that_share_a_vertex_are_split_there():

@@ -109,7 +109,7 @@ def test_curved_sources_leave_no_offset(constraint, around_a_ball):
     """The interpolant of the distance lies 0.011 above it on the sphere, on average; values and φ itself do not."""
     ball = sphere(4)
     phi = around_a_ball.distance(ball, constraint)
-    exact = np.linalg.norm(phi.mesh.vertices, axis=1) - 1
+    exact = np.linalg.norm(phi.domain.vertices, axis=1) - 1
     assert abs((phi.values - exact).mean()) < 0.002
     source = around_a_ball.discretization.lower([ball], 1.0)
     above = source.weights @ (source.interpolation @ exact) / source.weights.sum()

@@ -17,22 +17,22 @@ pytestmark = pytest.mark.usefixtures("forked_parsers")
 def ball():
     """Exact distance from the unit sphere at the vertices of a lattice."""
     mesh = lattice(10)
-    return sh.TetField(mesh, np.linalg.norm(mesh.vertices, axis=1) - 1)
+    return sh.Field(mesh, np.linalg.norm(mesh.vertices, axis=1) - 1)
 
 
 def test_interpolation_is_linear_inside_and_straight_outside():
     mesh = boxes((3, 3, 3), 1.0, jitter=0.15)
     slope = np.array([0.3, -0.5, 0.8])
-    phi = sh.TetField(mesh, mesh.vertices @ slope + 1)
+    phi = sh.Field(mesh, mesh.vertices @ slope + 1)
     points = np.random.default_rng(0).uniform(-2, 5, (500, 3))
     assert phi(points) == pytest.approx(points @ slope + 1, abs=1e-12)
     assert phi.gradient(points) == pytest.approx(np.tile(slope, (500, 1)), abs=1e-12)
-    assert phi.tet_gradients == pytest.approx(np.tile(slope, (mesh.n_tets, 1)), abs=1e-12)
+    assert phi.cell_gradients == pytest.approx(np.tile(slope, (mesh.n_tets, 1)), abs=1e-12)
     assert phi([1.0, 1.0, 1.0]) == pytest.approx(1.6)
     with refused(sh.errors.GeometryError, "points"):
         phi([[0.0, 1.0]])
     with refused(sh.errors.GeometryError, "values"):
-        sh.TetField(mesh, [1.0, 2.0])
+        sh.Field(mesh, [1.0, 2.0])
 
 
 def test_level_sets_are_closed_manifold_and_face_outward(ball):
@@ -48,16 +48,16 @@ def test_level_sets_are_closed_manifold_and_face_outward(ball):
 
 
 def test_level_sets_of_anything_are_closed_manifold(ball):
-    mesh = ball.mesh
+    mesh = ball.domain
     rng = np.random.default_rng(4)
     for values in (rng.normal(size=mesh.n_vertices), rng.integers(-1, 2, mesh.n_vertices) * 1.0, mesh.vertices[:, 0]):
-        assert_closed_manifold(sh.TetField(mesh, values).contour(0.0))
+        assert_closed_manifold(sh.Field(mesh, values).contour(0.0))
 
 
 def test_level_sets_at_edges_without_faces_between_are_manifold():
     tets = [[0, 1, 2, 3], [0, 1, 4, 5]]
     mesh = sh.TetMesh([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], tets)
-    surface = sh.TetField(mesh, [-1.0, -1.0, 1.0, 1.0, 1.0, 1.0]).contour()
+    surface = sh.Field(mesh, [-1.0, -1.0, 1.0, 1.0, 1.0, 1.0]).contour()
     assert_closed_manifold(surface)
 
 
@@ -106,11 +106,11 @@ def test_surfaces_in_tet_formats_are_surfaces(tmp_path):
 def test_fields_survive_files(ball, ending, tmp_path):
     values = ball.values.copy()
     values[3] = np.nan
-    sh.TetField(ball.mesh, values).save(tmp_path / f"phi{ending}")
+    sh.Field(ball.domain, values).save(tmp_path / f"phi{ending}")
     again = sh.read_field(tmp_path / f"phi{ending}")
-    assert isinstance(again, sh.TetField)
+    assert isinstance(again.domain, sh.TetMesh)
     assert np.array_equal(again.values, values, equal_nan=True)
-    assert (again.mesh.tets == ball.mesh.tets).all()
+    assert (again.domain.tets == ball.domain.tets).all()
     with refused(sh.errors.FileFormatError):
         ball.save(tmp_path / "phi.stl")
 
@@ -158,7 +158,7 @@ def test_a_broken_shape_is_completed():
     keep = np.random.default_rng(0).random(whole.n_faces) > 0.2
     broken = sh.TriangleMesh(whole.vertices, whole.faces[keep])
     phi = sh.SignedHeatSolver(sh.tetrahedralize(broken, resolution=12)).distance(broken)
-    exact = np.linalg.norm(phi.mesh.vertices, axis=1) - 1
+    exact = np.linalg.norm(phi.domain.vertices, axis=1) - 1
     assert rms(phi.values - exact) < 0.02
     surface = phi.contour()
     assert_closed_manifold(surface)

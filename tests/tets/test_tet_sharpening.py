@@ -20,11 +20,11 @@ def test_distance_from_a_plane_is_exact_to_rounding():
     """Whatever the scale and the slope of what vanishes on it."""
     mesh = boxes((8, 8, 8), 0.25, jitter=0.1)
     line = (mesh.vertices - [0.9, 1.1, 1.0]) @ [0.6, 0.0, 0.8]
-    sharp = sh.sharpen(sh.TetField(mesh, 3 * line))
+    sharp = sh.sharpen(sh.Field(mesh, 3 * line))
     inner = np.abs(mesh.vertices - 1).max(axis=1) < 0.55  # whose foot on the plane lies in the cube
     assert inner.sum() > 20
     assert np.abs(sharp.values - line)[inner].max() < 1e-12
-    large = sh.sharpen(sh.TetField(sh.TetMesh(1e4 * mesh.vertices, mesh.tets), line))
+    large = sh.sharpen(sh.Field(sh.TetMesh(1e4 * mesh.vertices, mesh.tets), line))
     assert large.values == pytest.approx(1e4 * sharp.values, abs=1e-7)
 
 
@@ -68,7 +68,7 @@ def test_walls_without_thickness_between_are_not_seen_through():
     keep = lambda c: ~((c[:, 0] < 1.0) & (np.abs(c[:, 2] - 1) < 1 / n))  # noqa: E731
     mesh = boxes((2 * n, 4, 2 * n), 1 / n, keep=keep)
     x, _, z = mesh.vertices.T
-    sharp = sh.sharpen(sh.TetField(mesh, z - 0.55)).values
+    sharp = sh.sharpen(sh.Field(mesh, z - 0.55)).values
     above = (z >= 1.0) & (x < 0.9) & np.isin(np.arange(mesh.n_vertices), mesh.tets)
     edge = 1.0
     low = np.hypot(edge - x, 0) + (z - 0.55)  # the way is at least so long as over the edge of the slit …
@@ -85,7 +85,7 @@ def test_a_zero_set_beyond_a_gap_does_not_count():
     )
     x, z = two.vertices[:, 0], two.vertices[:, 2]
     own = np.arange(2 * n) >= n
-    sharp = sh.sharpen(sh.TetField(two, np.where(own, x - 0.3, z - 0.48))).values
+    sharp = sh.sharpen(sh.Field(two, np.where(own, x - 0.3, z - 0.48))).values
     assert sharp[own] == pytest.approx((x - 0.3)[own], abs=1e-9)
     assert sharp[~own] == pytest.approx((z - 0.48)[~own], abs=1e-9)
 
@@ -107,7 +107,7 @@ def test_convex_method_holds_slopes_and_signs():
     sharp = sh.sharpen(plain, method=sh.methods.Convex(), progress=lambda *step: seen.append(step))
     ended = sharp.diagnostics.note(ConvexRounds)
     assert ended.residual <= 2e-3 and ended.rounds <= 200 and ended.rounds < len(seen)
-    excess = np.maximum(np.linalg.norm(sharp.tet_gradients, axis=1) - 1, 0)
+    excess = np.maximum(np.linalg.norm(sharp.cell_gradients, axis=1) - 1, 0)
     assert np.sqrt(np.average(excess**2, weights=mesh.tet_volumes)) <= 2e-3
     assert (np.abs(sharp.values) <= np.abs(ball_around(mesh)) + 0.05).all()
     assert rms(sharp.values - ball_around(mesh)) < 0.05
@@ -125,10 +125,10 @@ def test_what_is_unknown_stays_unknown():
     one = boxes((4, 4, 4), 0.5)
     two = sh.TetMesh(np.concatenate([one.vertices, one.vertices + 10]), np.concatenate([one.tets, one.tets + 125]))
     values = np.concatenate([one.vertices[:, 0] - 0.9, np.full(125, np.nan)])
-    sharp = sh.sharpen(sh.TetField(two, values))
+    sharp = sh.sharpen(sh.Field(two, values))
     assert np.isfinite(sharp.values[:125]).all() and np.isnan(sharp.values[125:]).all()
     values[125:] = 4.0  # a part without a zero set keeps what it has
-    assert (sh.sharpen(sh.TetField(two, values)).values[125:] == 4.0).all()
+    assert (sh.sharpen(sh.Field(two, values)).values[125:] == 4.0).all()
 
 
 def test_fields_from_files_can_be_sharpened(tmp_path):
@@ -144,7 +144,7 @@ def test_fields_from_files_can_be_sharpened(tmp_path):
 def test_one_sign_is_refused():
     mesh = boxes((2, 2, 2), 1.0)
     with refused(sh.errors.OutsideError):
-        sh.sharpen(sh.TetField(mesh, 1 + mesh.vertices[:, 0]))
+        sh.sharpen(sh.Field(mesh, 1 + mesh.vertices[:, 0]))
 
 
 def test_progress_can_cancel():

@@ -39,13 +39,13 @@ THINGS = {
     "voxels": lambda: VOXELS,
     "tets": lambda: TETS,
     "line": lambda: SQUARE,
-    "field on a grid": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) - 1),
+    "field on a grid": lambda: sh.Field(GRID, np.linalg.norm(GRID.points, axis=-1) - 1),
     "field in a band": lambda: sh.signed_distance(samples.sphere(2), spacing=0.15, band=0.3),
-    "field of one sign": lambda: sh.GridField(GRID, np.linalg.norm(GRID.points, axis=-1) + 1),
-    "field in the plane": lambda: sh.GridField(PLANE, height(PLANE.points)),
-    "field on tets": lambda: sh.TetField(TETS, height(TETS.vertices)),
-    "field on a mesh": lambda: sh.VertexField(BALL, height(BALL.vertices)),
-    "field on voxels": lambda: sh.VertexField(VOXELS, height(VOXELS.vertices) - 4),
+    "field of one sign": lambda: sh.Field(GRID, np.linalg.norm(GRID.points, axis=-1) + 1),
+    "field in the plane": lambda: sh.Field(PLANE, height(PLANE.points)),
+    "field on tets": lambda: sh.Field(TETS, height(TETS.vertices)),
+    "field on a mesh": lambda: sh.Field(BALL, height(BALL.vertices)),
+    "field on voxels": lambda: sh.Field(VOXELS, height(VOXELS.vertices) - 4),
     "piecewise field": piecewise,
 }
 BARE = {
@@ -53,9 +53,9 @@ BARE = {
     "triangulation": lambda: sh.intrinsic_delaunay(BALL),
 }
 EMPTY = {
-    "grid without values": lambda: sh.GridField(GRID, np.full(GRID.shape, np.nan)),
-    "tets without values": lambda: sh.TetField(TETS, np.full(TETS.n_vertices, np.nan)),
-    "mesh without values": lambda: sh.VertexField(BALL, np.full(BALL.n_vertices, np.nan)),
+    "grid without values": lambda: sh.Field(GRID, np.full(GRID.shape, np.nan)),
+    "tets without values": lambda: sh.Field(TETS, np.full(TETS.n_vertices, np.nan)),
+    "mesh without values": lambda: sh.Field(BALL, np.full(BALL.n_vertices, np.nan)),
 }
 
 
@@ -95,7 +95,7 @@ def test_what_has_no_picture_is_text(make):
 
 def test_text_is_escaped():
     grid = sh.Grid((0, 0, 0, 0), 1.0, (2, 2, 2, 2))
-    assert "<img" not in sh.GridField(grid, np.zeros(grid.shape))._repr_html_()
+    assert "<img" not in sh.Field(grid, np.zeros(grid.shape))._repr_html_()
 
 
 def test_without_matplotlib_notebooks_show_text():
@@ -113,7 +113,7 @@ def test_fields_go_to_pyvista_with_their_values(name):
     field = THINGS[name]()
     thing = field.to_pyvista()
     values = thing.point_data["signed_distance"]
-    if isinstance(field, sh.GridField | sh.TetField):  # PyVista's own interpolation finds the same value at each point
+    if isinstance(field.domain, sh.Grid | sh.TetMesh):  # PyVista's own interpolation finds the same value at each point
         d = getattr(field.domain, "dimension", 3)
         assert np.abs(field(np.asarray(thing.points)[:, :d]) - values).max() < (
             1e-12 if d == 2 or "grid" in name else 0.3

@@ -22,14 +22,14 @@ CELL = 13
 def slices(path):
     grid = sh.Grid((-1.5, -1.2, -1.2), 0.1, (31, 25, 25))
     values = np.maximum(np.linalg.norm(grid.points, axis=-1) - 1, 0.3 - np.linalg.norm(grid.points - 0.5, axis=-1))
-    view.save_slices(sh.GridField(grid, values), path, samples.sphere(2), levels=[0.2])
+    view.save_slices(sh.Field(grid, values), path, samples.sphere(2), levels=[0.2])
 
 
 def plane(path):
     grid = sh.Grid((0, 0), 0.1, (41, 31))
     line = sh.Polyline([[1, 1], [1, 2], [3, 2], [3, 1]], closed=True)
     x, y = np.moveaxis(np.abs(grid.points - [2, 1.5]) - [1, 0.5], -1, 0)
-    view.save_slices(sh.GridField(grid, np.maximum(x, y)), path, [line])
+    view.save_slices(sh.Field(grid, np.maximum(x, y)), path, [line])
 
 
 def broken_shape(path):
@@ -47,7 +47,7 @@ def points(path):
 def surface(path):
     ball = samples.sphere(3)
     curve = ball.polyline([[1.0, 0.0, 0.4], [0.0, -1.0, 0.5], [-1.0, 0.0, 0.4]])
-    field = sh.VertexField(ball, np.where(ball.vertices[:, 0] > 0.9, np.nan, ball.vertices[:, 2] - 0.4))
+    field = sh.Field(ball, np.where(ball.vertices[:, 0] > 0.9, np.nan, ball.vertices[:, 2] - 0.4))
     view.save_surface(field, path, [curve])
 
 
@@ -87,7 +87,7 @@ def test_sources_are_drawn_where_they_are_whatever_triangles_the_field_has():
         sh.piecewise_distance(loop, mesh),
         sh.piecewise_distance(loop, mesh, intrinsic=True),
     ]
-    assert isinstance(fields[2].domain, sh.IntrinsicTriangulation)
+    assert isinstance(fields[2].domain.surface, sh.IntrinsicTriangulation)
     drawn = []
     for field in fields:
         axes = view.figures.new_figure(4, 4).add_subplot()
@@ -109,12 +109,12 @@ def test_rows_have_no_empty_panels(tmp_path, thing):
 def test_infinite_values_are_refused(tmp_path):
     grid = sh.Grid((0, 0), 1.0, (3, 3))
     with refused(sh.errors.GeometryError, "field"):
-        view.save_slices(sh.GridField(grid, [[0.0, 1, 2], [1, 2, np.inf], [3, 4, 5]]), tmp_path / "a.png")
+        view.save_slices(sh.Field(grid, [[0.0, 1, 2], [1, 2, np.inf], [3, 4, 5]]), tmp_path / "a.png")
 
 
 def test_a_single_source_is_drawn_as_a_list_of_it_is(tmp_path):
     ball = samples.sphere(1)
-    field, source = sh.VertexField(ball, ball.vertices[:, 2]), ball.points_at(0)
+    field, source = sh.Field(ball, ball.vertices[:, 2]), ball.points_at(0)
     for name, given in (("one", source), ("list", [source])):
         view.save_surface(field, tmp_path / f"{name}.png", given)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "list.png").read_bytes()

@@ -35,7 +35,7 @@ def test_cross_section_that_misses_is_empty():
 @pytest.mark.parametrize("shape", [None, samples.oriented_points(samples.sphere(2), 100), samples.sphere(2)])
 def test_slices_of_fields_with_one_sign(tmp_path, shape):
     grid = sh.Grid((-1, -1, -1), 0.2, (11, 11, 11))
-    view.save_slices(sh.GridField(grid, 2 + grid.points[..., 0]), tmp_path / "a.png", shape)
+    view.save_slices(sh.Field(grid, 2 + grid.points[..., 0]), tmp_path / "a.png", shape)
     assert (tmp_path / "a.png").stat().st_size > 1000
 
 

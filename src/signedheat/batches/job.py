@@ -21,8 +21,8 @@ from ..errors import (
     SourceError,
     UnsupportedTypeError,
 )
-from ..grids.grid import RESOLUTION
-from ..grids.grid_field import GridField
+from ..fields.field import Field
+from ..grids.grid import RESOLUTION, Grid
 from ..io.field_files import BAND_FORMATS, FIELD_FORMATS
 from ..io.files import distinct_names, extension
 from ..io.key_figures import describe, inspected, shape_figures
@@ -246,7 +246,7 @@ class Job:
             shape = shape.smooth_surface
         reach = max(map(abs, self.offsets), default=0.0)
         grid = grid_around(shape, reach, self.resolution, self.padding, self.spacing)
-        phi: GridField = measured_distance(shape, grid, self._completion, self._method, self.plain, band=self.band)
+        phi: Field[Grid] = measured_distance(shape, grid, self._completion, self._method, self.plain, band=self.band)
         figures |= {"notes": [str(note) for note in phi.diagnostics.important], "field": describe(phi)}
         if self.volume is not None:
             phi.save(f"{stem}{self.volume}")

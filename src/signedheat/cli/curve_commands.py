@@ -107,7 +107,7 @@ def surface(arguments: Namespace) -> Summary:
     sh.io.ensure_writable(arguments.output, sh.io.VERTEX_FIELD_FORMATS, "a field on a surface")
     domain, sources = surface_and_curves(arguments)
     field = distance_on_surface(domain, sources, arguments)
-    (field.subdivided() if arguments.subdivide else field).save(arguments.output)
+    (field.expand() if arguments.subdivide else field).save(arguments.output)
     low, high = float(numpy.nanmin(field.values)), float(numpy.nanmax(field.values))
     summary = {
         "mesh": arguments.mesh,
@@ -125,7 +125,8 @@ def surface(arguments: Namespace) -> Summary:
     if arguments.contours:
         summary["contours"] = f"{arguments.output}.contours.obj"
         levels = numpy.linspace(low, high, arguments.contours + 2)[1:-1].tolist()
-        isolines = [curve for level in levels for curve in field.contour(level)]
+        lines: Any = map(field.contour, levels)
+        isolines = [curve for at_level in lines for curve in at_level]
         sh.io.write_curves(isolines, summary["contours"], domain)
     if arguments.preview:
         up = "xyz".index(arguments.up)
@@ -204,11 +205,11 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
     return domain, sh.io.read_curves(arguments.curves, domain)
 
 
-def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -> sh.VertexField:
+def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -> sh.Field[Any]:
     """Return the distance to the curves."""
     constraint = shapes.constraint_of(arguments.constraint)
     intrinsic: Literal[True, "auto"] = True if arguments.intrinsic else "auto"
-    field: sh.VertexField
+    field: sh.Field[Any]
     with shapes.prefix_errors(arguments.curves), ProgressBar(is_quiet(arguments)) as progress:
         if arguments.plain or not isinstance(
             constraint, sh.constraints.Free | sh.constraints.ZeroSet | sh.constraints.Soft
@@ -228,7 +229,7 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
     return field
 
 
-def _with_pieces(field: sh.VertexField, summary: dict[str, Any], text: str) -> str:
+def _with_pieces(field: sh.Field[Any], summary: dict[str, Any], text: str) -> str:
     """Add the curves that were flipped or left out to a summary and its text."""
     note = field.diagnostics.note(distance.CurvesTaken)
     if note is None:

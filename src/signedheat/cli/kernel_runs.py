@@ -90,7 +90,7 @@ def tets() -> None:
     field = sh.SignedHeatSolver(sh.tetrahedralize(ball, resolution=5)).distance(ball)
     field.contour(0.1)
     sh.sharpen(field)
-    sh.signed_distance(ball, field.mesh)
+    sh.signed_distance(ball, field.domain)
 
 
 def _curve(ball: sh.TriangleMesh) -> sh.Curve:

@@ -194,7 +194,7 @@ def constraint_of(word: str) -> Constraint:
 
 def measured(
     arguments: Namespace, image: sh.io.LabelImage | None = None, reach: float | None = None
-) -> tuple[Any, sh.GridField]:
+) -> tuple[Any, sh.Field[sh.Grid]]:
     """Return the shape of a command, from a file or an image, and the distance to it, with room for offsets."""
     with prefix_errors(arguments.shape):
         if image is not None:
@@ -212,10 +212,10 @@ def method_of(arguments: Namespace) -> tuple[Completion, Heat]:
 
 
 @overload
-def compute(shape: Any, domain: sh.Grid, arguments: Namespace) -> sh.GridField: ...
+def compute(shape: Any, domain: sh.Grid, arguments: Namespace) -> sh.Field[sh.Grid]: ...
 @overload
-def compute(shape: Any, domain: sh.TetMesh, arguments: Namespace) -> sh.TetField: ...
-def compute(shape: Any, domain: sh.Grid | sh.TetMesh, arguments: Namespace) -> sh.GridField | sh.TetField:
+def compute(shape: Any, domain: sh.TetMesh, arguments: Namespace) -> sh.Field[sh.TetMesh]: ...
+def compute(shape: Any, domain: sh.Grid | sh.TetMesh, arguments: Namespace) -> sh.Field[Any]:
     """Return the distance to a shape in space or to lines in the plane; print important notes on standard error."""
     where: Any = (
         nullcontext(arguments.scheduler) if arguments.workers is None else ThreadPoolExecutor(arguments.workers)
@@ -233,7 +233,7 @@ def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | No
         say(printable(f"signedheat: {note}" if path is None else f"signedheat: {path}: {note}"))
 
 
-def hint(field: sh.GridField) -> str:
+def hint(field: sh.Field[sh.Grid]) -> str:
     """Return another line of output if faces may have been given twice, or else an empty text."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
@@ -250,7 +250,7 @@ def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
     return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{named(unit)}"
 
 
-def on_tets(arguments: Namespace) -> tuple[Any, sh.TetField]:
+def on_tets(arguments: Namespace) -> tuple[Any, sh.Field[sh.TetMesh]]:
     """Return the shape of a command, and the distance to it on tets from a file or around the shape."""
     shape, mesh = read_shape(arguments, arguments.shape), sh.read(arguments.tets) if arguments.tets else None
     if mesh is not None and not isinstance(mesh, sh.TetMesh):
@@ -315,12 +315,12 @@ def labels_of(image: sh.io.LabelImage) -> list[int] | None:
     return [int(label) for label in distinct]
 
 
-def field_of(image: sh.io.LabelImage) -> sh.GridField:
+def field_of(image: sh.io.LabelImage) -> sh.Field[sh.Grid]:
     """Return the values of an image as a field along its own axes."""
-    return sh.GridField(image.grid, image.labels.astype(np.float64))
+    return sh.Field(image.grid, image.labels.astype(np.float64))
 
 
-def thing_of(image: sh.io.LabelImage) -> sh.GridField | sh.PolygonMesh:
+def thing_of(image: sh.io.LabelImage) -> sh.Field[sh.Grid] | sh.PolygonMesh:
     """Return what an image shows, along its own axes: a field, or the boundary of all voxels with a label."""
     if labels_of(image) is None:
         return field_of(image)
@@ -342,7 +342,9 @@ def ensure_surface_writable(path: str, planar: bool = False) -> None:
         sh.io.ensure_writable(path, sh.io.SHAPE_FORMATS - {".xyz", ".pc"}, "a surface")
 
 
-def save_level(what: Any, path: str, image: sh.io.LabelImage | None = None, field: sh.GridField | None = None) -> None:
+def save_level(
+    what: Any, path: str, image: sh.io.LabelImage | None = None, field: sh.Field[sh.Grid] | None = None
+) -> None:
     """Write a surface, or polylines in the plane; a surface from an image gets the image's place.
 
     Where the field has a confidence, and the format has room for it, that is written at each vertex.

@@ -99,7 +99,7 @@ def volume(arguments: Namespace) -> Summary:
     unit = shapes.unit_in_use(arguments, arguments.shape)
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
     summary["units"] = unit
-    nodes = " × ".join(map(str, field.grid.shape))
+    nodes = " × ".join(map(str, field.domain.shape))
     within = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
     text = f"{printable(arguments.output)}: {nodes} nodes{within}, {shapes.range_in_words(summary, unit)}"
     return summary, text + shapes.hint(field)
@@ -113,7 +113,7 @@ def _on_tets(arguments: Namespace) -> Summary:
     field.save(arguments.output)
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape)
-    n_tets, unit = field.mesh.n_tets, shapes.unit_in_use(arguments, arguments.shape)
+    n_tets, unit = field.domain.n_tets, shapes.unit_in_use(arguments, arguments.shape)
     summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), "n_tets": n_tets}
     summary["units"] = unit
     return summary, f"{printable(arguments.output)}: {counted(n_tets, 'tet')}, {shapes.range_in_words(summary, unit)}"
@@ -223,9 +223,9 @@ def morph(arguments: Namespace) -> Summary:
     """Write the surface that an operation of morphology makes of a shape."""
     shapes.ensure_surface_writable(arguments.output)
     shape = shapes.read_shape(arguments, arguments.shape)
-    fields: list[sh.GridField] = []
+    fields: list[sh.Field[sh.Grid]] = []
 
-    def measure(part: Any, grid: sh.Grid) -> sh.GridField:
+    def measure(part: Any, grid: sh.Grid) -> sh.Field[sh.Grid]:
         fields.append(shapes.compute(part, grid, arguments))
         return fields[-1]
 
@@ -467,18 +467,19 @@ def contour(arguments: Namespace) -> Summary:
     if isinstance(field, sh.io.LabelImage):
         image = field
         field = shapes.field_of(field)
-    on_surface = isinstance(field, sh.VertexField)
+    on_grid = isinstance(field.domain, sh.Grid)
+    on_surface = not on_grid and not isinstance(field.domain, sh.TetMesh)
     if on_surface:
         sh.io.ensure_writable(path, sh.io.CURVE_FORMATS, "curves")
     else:
-        shapes.ensure_surface_writable(path, isinstance(field, sh.GridField) and field.grid.dimension == 2)
+        shapes.ensure_surface_writable(path, on_grid and field.domain.dimension == 2)
     with shapes.prefix_errors(arguments.field):
         surface = field.contour(arguments.level)
     if on_surface:
         sh.io.write_curves(surface, path, field.domain)
         numbers = {"curves": len(surface)}
     else:
-        shapes.save_level(surface, path, image, field if isinstance(field, sh.GridField) else None)
+        shapes.save_level(surface, path, image, field if on_grid else None)
         numbers = shapes.counts(surface)
     kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
     summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}

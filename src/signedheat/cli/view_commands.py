@@ -124,9 +124,9 @@ def view(arguments: Namespace) -> Summary:
     sh.view.ensure_picture_writable(output)
     thing = shape_or_field(arguments.file)
     with shapes.prefix_errors(arguments.file):
-        if isinstance(thing, sh.VertexField):
+        if isinstance(thing, sh.Field) and not isinstance(thing.domain, sh.Grid | sh.TetMesh):
             sh.view.save_surface(thing, output, up=up)
-        elif isinstance(thing, sh.GridField | sh.TetField):
+        elif isinstance(thing, sh.Field):
             sh.view.save_slices(thing, output)
         elif isinstance(thing, list):
             sh.view.save_row([(Path(arguments.file).name, thing)], output)

@@ -13,6 +13,7 @@ from ..calls import public_call
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
 from ..errors import SourceError, UnsupportedTypeError
+from ..fields.field import Field
 from ..foreign import ForeignShape, as_list, converted
 from ..jobs import Progress
 from ..kinds import SurfaceDomain
@@ -22,10 +23,10 @@ from ..parallel import PointTree
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given
+from ..surfaces.surface import LinearDomain
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..surfaces.vertex_field import VertexField
 from ..validation import flag
 from .curve_distance import distance_to_pieces, warn_of_gaps
 from .resolution import flattened, on_resolving_triangles
@@ -122,7 +123,7 @@ def completion(
     progress: Progress | None = None,
     as_oriented: bool = False,
     every_piece: bool = False,
-) -> tuple[VertexField[SurfaceDomain], list[Curve]]:
+) -> tuple[Field[SurfaceDomain], list[Curve]]:
     """Return the distance to broken curves, found on a repaired mesh, along its edges if possible; its zero set."""
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
@@ -135,7 +136,7 @@ def completion(
 
     pieces = None if as_oriented or own_levels else pieces_for_all(surface, flattened(kept))
 
-    def measured(solver: SignedHeatSolver[SurfaceDomain]) -> VertexField:
+    def measured(solver: SignedHeatSolver[SurfaceDomain]) -> Field[SurfaceDomain]:
         if as_oriented or own_levels:
             return distance_unwarned(solver, curves, constraint)
         field = distance_to_pieces(solver, kept, constraint, every_piece, numbers_given(kept, left_out), pieces)[0]
@@ -156,11 +157,11 @@ def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints
         )
 
 
-def zero_set(field: VertexField[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
+def zero_set(field: Field[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
     """Return the zero set of a field as curves, without loops too short or too far away to complete the given ones."""
     if not isinstance(field.domain, TriangleMesh):
         return field.contour(0.0)
-    fine = field.finest  # its contours, too, are curves on the given mesh
+    fine = cast("Field[LinearDomain]", field.finest)  # its contours, too, are curves on the given mesh
     surface = discretize(fine.domain)
     assert isinstance(surface, SurfaceDiscretization)
     values = fine.values.copy()

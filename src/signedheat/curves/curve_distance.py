@@ -15,6 +15,7 @@ from ..arrays import Bools, Ints
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, warn_user
+from ..fields.field import Field
 from ..foreign import as_list
 from ..jobs import Progress
 from ..kinds import AnySurface, SurfaceDomain
@@ -27,7 +28,6 @@ from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..surfaces.vertex_field import VertexField
 from ..validation import flag
 from ..words import percent
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
@@ -105,7 +105,7 @@ def distance_to_pieces(
     every_piece: bool,
     numbers: Ints | None = None,
     pieces: CurvePieces | None = None,
-) -> tuple[VertexField[Surface], list[CurveOrPoints]]:
+) -> tuple[Field[Surface], list[CurveOrPoints]]:
     """Return the distance to curves that may be pieces of broken ones, and the curves that it was measured to.
 
     Pieces are turned until they bound something together (`curve_orientation`), and those that do not are left out,
@@ -192,9 +192,7 @@ def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
     return np.asarray(kept[part])
 
 
-def reason_for_doubt(
-    decision: Decision, field: VertexField[Surface], curves: Sequence[CurveOrPoints], numbers: Ints
-) -> str:
+def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence[CurveOrPoints], numbers: Ints) -> str:
     """Return, as a warning, why the region that the curves bound is a guess, and what to do; "" if it is no guess.
 
     `field` is the distance, completed by heat, to the curves that were not left out. `curves` are all curves given,
@@ -256,7 +254,7 @@ def distance_to_curves(
     as_oriented: bool = False,
     every_piece: bool = False,
     progress: Progress | None = None,
-) -> VertexField[AnySurface]:
+) -> Field[AnySurface]:
     """Signed distance to curves and points on a surface: see `signed_distance`, which calls this.
 
     The signed heat method decides the sides and completes what is missing; then distance is measured along the surface,
@@ -280,7 +278,7 @@ def distance_to_curves(
     is_default = intrinsic == "auto"
     pieces = None if is_default or as_oriented else pieces_for_all(solver.domain, flattened(listed))
 
-    def measured(by: SignedHeatSolver[Any]) -> tuple[VertexField[AnySurface], CurvesAndPoints]:
+    def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints]:
         if as_oriented:
             return distance_unwarned(by, given, constraint), listed
         return distance_to_pieces(by, listed, constraint, every_piece, numbers_given(listed, left_out), pieces)

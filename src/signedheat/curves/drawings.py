@@ -16,12 +16,12 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, Note
 from ..errors import ConstraintError
+from ..fields.field import Field
+from ..fields.solid_queries import Closest
 from ..foreign import as_list
 from ..grids.grid import RESOLUTION, Grid
-from ..grids.grid_field import GridField
 from ..grids.marching import values_at_walls
 from ..grids.polyline import Polyline
-from ..grids.solid_queries import Closest
 from ..jobs import Progress, Stopwatch, within
 from ..kinds import Sources
 from ..mesh.components import connected_components, sums_of
@@ -62,7 +62,7 @@ def distance_to_lines(
     as_oriented: bool = False,
     every_piece: bool = False,
     progress: Progress | None = None,
-) -> GridField:
+) -> Field[Grid]:
     """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
 
     Closed outlines become the boundary of what they fill. If strokes are left, they are turned until they bound
@@ -92,11 +92,11 @@ def distance_to_lines(
         listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece, within(progress, 0.0, 0.4))
         notes += [taken] if taken else []
     solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
-    phi = cast("GridField[Literal[2]]", solver.distance(listed, constraint))
+    phi = cast("Field[Grid[Literal[2]]]", solver.distance(listed, constraint))
     if is_drawing:
         closing = closing_lines(listed)
         if closing and bulges(phi, listed, closing):
-            phi = cast("GridField[Literal[2]]", solver.distance([*listed, *closing], constraint))
+            phi = cast("Field[Grid[Literal[2]]]", solver.distance([*listed, *closing], constraint))
         beyond = values_at_walls(phi.values) < 0
         if beyond.all() or (closing and beyond.mean() > 0.5):  # what is bounded is inside, whichever way it runs
             listed, phi = [line.reversed() for line in listed], phi.with_values(-phi.values)
@@ -105,13 +105,13 @@ def distance_to_lines(
     return _field_of(drawing, domain, diagnostics, progress)
 
 
-def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> GridField:
+def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> Field[Grid]:
     """Return the distance to a drawing at the nodes of a grid, as a field that holds the drawing."""
     watch = Stopwatch(within(progress, 0.8, 1.0), 1)
     with watch("measure") as run:
         values = run(lambda: drawing.distance(grid.points.reshape(-1, 2)).reshape(grid.shape))
     timings = {**diagnostics.timings, **watch.seconds}
-    return GridField(grid, values, replace(diagnostics, timings=timings), solid=drawing)
+    return Field(grid, values, replace(diagnostics, timings=timings), solid=drawing)
 
 
 def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
@@ -153,7 +153,7 @@ def closing_lines(lines: Sequence[Polyline]) -> list[Polyline]:
     return [Polyline([ends[k], begins[following[k]]]) for k in wide.tolist()]
 
 
-def bulges(phi: GridField[Literal[2]], lines: Sequence[Polyline], closing: Sequence[Polyline]) -> bool:
+def bulges(phi: Field[Grid[Literal[2]]], lines: Sequence[Polyline], closing: Sequence[Polyline]) -> bool:
     """Return whether heat leaves a gap open, as between parallel strokes, or closes it by a bulge as long as itself."""
     beyond = values_at_walls(phi.values) < 0
     if beyond.any() and not beyond.all():
@@ -221,16 +221,16 @@ class Drawing(Frozen):
     # (k, 2, 2) segments where lines are missing
     completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
     # decides the side at the completion and away from lines. Without it, lines are outlines of what is inside
-    phi: GridField[Literal[2]] | None = None
+    phi: Field[Grid[Literal[2]]] | None = None
 
     @classmethod
-    def completed(cls, lines: Floats, phi: GridField[Literal[2]]) -> Drawing:
+    def completed(cls, lines: Floats, phi: Field[Grid[Literal[2]]]) -> Drawing:
         """Make a drawing of lines and of the zero set of φ where that is far from them."""
         crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
         zero_set = segments_of_lines(phi.contour()) if crosses else np.empty((0, 2, 2))
         if len(lines) and len(zero_set):
             away = tree_of(lines).distances(_in_space(zero_set.mean(axis=1)))
-            zero_set = zero_set[away > SIDE_CELLS * float(phi.grid.spacing.max())]
+            zero_set = zero_set[away > SIDE_CELLS * float(phi.domain.spacing.max())]
         return cls(lines, zero_set, phi)
 
     @property
@@ -294,7 +294,7 @@ class Drawing(Frozen):
         on_line = nearest < len(self.lines)
         sides = np.ones(len(points)) if self.phi is None else np.where(self.phi.interpolate(points) < 0, -1.0, 1.0)
         if self.phi is not None:
-            on_line &= found.distances < SIDE_CELLS * float(self.phi.grid.spacing.max())
+            on_line &= found.distances < SIDE_CELLS * float(self.phi.domain.spacing.max())
         sides[on_line] = self._sides(points[on_line], places[on_line], nearest[on_line])
         return sides * found.distances, places, nearest
 

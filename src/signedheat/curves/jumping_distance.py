@@ -17,8 +17,10 @@ import numpy as np
 
 from ..arrays import Bools, Complexes, Floats
 from ..calls import public_call
+from ..curves.cut_surface import CutSurface
 from ..diagnostics import Diagnostics, Jumps
 from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..fields.field import Field
 from ..foreign import ForeignShape, as_list, converted
 from ..jobs import Progress, Stopwatch, within
 from ..linear import chosen_backend
@@ -37,7 +39,6 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag, positive_number
 from ..words import counted
 from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_continuous, minimize, smoothed
-from .piecewise_field import IntrinsicPiecewiseField, PiecewiseField
 
 ROUGH_INTEGRATION = 1.0
 """Integration error above which there is a warning: as large as the slopes themselves."""
@@ -57,7 +58,7 @@ def piecewise_distance(
     intrinsic: bool | Literal["auto"] = "auto",
     smooth: bool = True,
     progress: Progress | None = None,
-) -> PiecewiseField:
+) -> Field[CutSurface]:
     """Signed distance to curves that need not bound a region, with jumps where no continuous distance exists.
 
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
@@ -89,7 +90,7 @@ def piecewise_distance(
 
     Returns
     -------
-    PiecewiseField
+    Field
         Its median over the source is zero. The objective is certified to be within 0.2 % of the least (300 thousand
         faces: minutes), or within 15 % if φ has no cut: what is left then are jumps smaller than the triangles.
         ``diagnostics.note(Jumps)`` has the objective, a lower bound of it, and the size of the jumps: see
@@ -113,7 +114,7 @@ def piecewise_distance(
     --------
     signed_distance : Distance on a grid, on tets or along a surface.
     close_curves : Close the gaps of curves on a surface.
-    PiecewiseField : Values that may jump on a surface.
+    results.CutSurface : The domain of the result.
 
     Examples
     --------
@@ -121,7 +122,8 @@ def piecewise_distance(
     >>> from signedheat.samples import torus
     >>> mesh = torus(n_around=48, n_across=24)
     >>> phi = piecewise_distance(mesh.path(range(24), closed=True), mesh)  # round the tube: bounds nothing
-    >>> len(phi.cut), phi.diagnostics.note(Jumps).gap < 0.002
+    >>> [cut] = phi.domain.cuts(phi.values)
+    >>> round(cut.height), phi.diagnostics.note(Jumps).gap < 0.002
     (1, True)
     >>> bool(phi.cut[0].height > 4)  # nearly the length of the way round, 2π
     True
@@ -160,7 +162,7 @@ def piecewise_distance(
         if smooth:
             values = smoothed(triangles, pairs, directions, values, cut)
     with stopwatch("finish"):
-        phi = _field(domain, triangles, centered(triangles, values, parts), cut)
+        phi = Field(CutSurface(domain, triangles, cut), centered(triangles, values, parts))
         error = integration_error(phi, directions)
     unreached = np.flatnonzero(np.isnan(phi.values[:, 0]))
     if len(unreached):
@@ -175,16 +177,16 @@ def piecewise_distance(
     return replace(phi, diagnostics=Diagnostics(dict(stopwatch.seconds), source.time, unreached, notes))
 
 
-def jumps_of(phi: PiecewiseField, solution: JumpSolution, error: float) -> Jumps:
+def jumps_of(phi: Field[CutSurface], solution: JumpSolution, error: float) -> Jumps:
     """Return the note on the jumps of a field, and on the objective that it minimises."""
     return Jumps(
         objective=solution.objective,
         bound=solution.bound,
         gap=solution.gap,
         rounds=solution.rounds,
-        continuous=not phi.is_cut.any(),
-        largest_jump=float(np.nanmax(np.abs(phi.jumps), initial=0.0)),
-        cut_length=float(sum(line.length for line in phi.cut)),
+        continuous=not phi.domain.is_cut.any(),
+        largest_jump=float(np.nanmax(np.abs(phi.domain.jumps(phi.values)), initial=0.0)),
+        cut_length=float(sum(line.length for line in phi.domain.cuts(phi.values))),
         integration_error=error,
     )
 
@@ -222,14 +224,6 @@ def _retriangulated(
         return domain, discretization
     domain = intrinsic_delaunay(domain.triangulation, keep=sources)
     return domain, conforming(_lowered(domain), sources)
-
-
-def _field(
-    domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation, triangles: IntrinsicMesh, values: Floats, cut: Bools
-) -> PiecewiseField:
-    if isinstance(domain, IntrinsicTriangulation):
-        return IntrinsicPiecewiseField(domain, domain, values, triangles, cut)
-    return PiecewiseField(domain, domain.triangulation, values, triangles, cut)
 
 
 def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation) -> SurfaceDiscretization:

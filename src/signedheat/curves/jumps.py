@@ -17,6 +17,8 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Ints, mask_of
+from ..curves.cut_surface import CutSurface
+from ..fields.field import Field
 from ..jobs import Progress
 from ..linear import factorize
 from ..linear.splitting import split_rounds
@@ -25,7 +27,6 @@ from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, split_corners
 from ..mesh.polylines import assemble_polylines
 from ..surfaces.cotan import cotan_matrix, divergence
-from .piecewise_field import PiecewiseField
 
 DUALITY_GAP, MOST_SPLITTING_ROUNDS = 2e-3, 3000
 """Relative gap between objective and bound at which minimisation ends, and the largest number of its rounds."""
@@ -292,11 +293,10 @@ def slope_error(triangles: IntrinsicMesh, at_corners: Floats, directions: Comple
     return float(np.sqrt(np.average(error[finite] ** 2, weights=triangles.face_areas[finite])))
 
 
-def integration_error(phi: PiecewiseField, directions: Complexes) -> float:
+def integration_error(phi: Field[CutSurface], directions: Complexes) -> float:
     """Root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the split surface."""
-    owner = phi.split_vertices[0]
-    mean = np.bincount(owner, phi.values.ravel()) / np.bincount(owner)
-    return slope_error(phi.triangles, mean[owner].reshape(-1, 3), directions)
+    at_corners = phi.domain.means(phi.values)[phi.domain.split_vertices[0]]
+    return slope_error(phi.domain.triangles, at_corners.reshape(-1, 3), directions)
 
 
 def cut_open(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> IntrinsicMesh:

@@ -9,13 +9,18 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Generic, Literal, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+import scipy
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, short
 from ..errors import GeometryError, MemoryLimitError
 from ..exchange import Displayed
+from ..fields.field_domain import Exact, FieldDomain, different
 from ..foreign import ForeignShape, Shape, as_shapes
+from ..mesh.triangles import flipped_along_creases
 from ..packages import lazy_module
+from ..parallel import in_chunks
+from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import (
     coordinates,
     finite_number,
@@ -29,13 +34,15 @@ from ..validation import (
     whole_number,
     whole_numbers,
 )
+from .exact_levels import NodeValues, on_level
+from .marching import closed_surface, level_lines, values_at_walls
 from .polyline import Polyline
 
 RESOLUTION = 128
 """Default number of nodes along the longest side of a grid."""
 if TYPE_CHECKING:
     import pyvista
-    from typing_extensions import TypeVar
+    from typing_extensions import Self, TypeVar
 
     Dimension = TypeVar("Dimension", bound=int, default=int, covariant=True)
 else:
@@ -46,7 +53,7 @@ else:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid(Displayed, Frozen, Generic[Dimension]):
+class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
     """Nodes at ``origin + index * spacing``, in any number of dimensions.
 
     Parameters
@@ -65,7 +72,7 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
 
     See Also
     --------
-    GridField : Values on a grid.
+    Field : Values on a domain.
     signed_distance : Distance on a grid, on tets or along a surface.
 
     Examples
@@ -246,9 +253,120 @@ class Grid(Displayed, Frozen, Generic[Dimension]):
             dimensions=(*self.shape, *(1 for _ in flat)), spacing=(*self.spacing, *flat), origin=(*self.origin, *flat)
         )
 
+    @property
+    def _values_shape(self) -> tuple[int, ...]:
+        return self.shape
+
+    def _interpolant(self, values: Floats, beyond: Exact | None) -> GridInterpolant:
+        return GridInterpolant(self, values)
+
+    def _clipped(self, points: ArrayLike) -> Floats:
+        places, shape = query_points(points, self.dimension)
+        return np.clip(places, self.origin, self.upper).reshape(*shape, self.dimension)
+
+    def _level_set(self, values: Floats, level: float, exact: Exact | None) -> TriangleMesh | list[Polyline]:
+        if self.dimension == 2:
+            lines = level_lines(values, self.spacing, level)
+            return [Polyline(self._placed(points, values, level, exact), closed) for points, closed in lines]
+        points, faces = closed_surface(values, self.spacing, level)
+        vertices = self._placed(points, values, level, exact)
+        if exact is not None:  # its level has creases, unlike what is interpolated
+            faces = flipped_along_creases(vertices, faces)
+        return TriangleMesh(vertices, faces)
+
+    def _placed(self, points: Floats, values: NodeValues, level: float, exact: Exact | None) -> Floats:
+        """Return the positions in space of points of a level set, which are given in cells."""
+        if exact is None:
+            return self.origin + points * self.spacing
+        return on_level(exact, points, values, self.origin, self.spacing, level)
+
+    def _values_at_walls(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values_at_walls(values)
+
+    def _shared(self, other: FieldDomain) -> Self:
+        if not isinstance(other, Grid):
+            return super()._shared(other)
+        if type(self) is not type(other):
+            raise other_nodes()
+        if self.shape != other.shape or not np.allclose(self.spacing, other.spacing, rtol=1e-12, atol=0):
+            raise different(self, other)
+        if not (np.abs(self.origin - other.origin) <= 1e-9 * self.spacing).all():  # apart by more than rounding
+            raise different(self, other)
+        return self
+
     def __repr__(self) -> str:
         step = self.spacing[0] if np.ptp(self.spacing) <= 1e-12 * self.spacing[0] else self.spacing
         return f"Grid(origin={short(self.origin)}, spacing={short(step)}, shape={self.shape})"
+
+
+def other_nodes() -> GeometryError:
+    """Return the error for fields of which one has values at nodes where the other has none."""
+    return GeometryError(
+        "fields in bands have values at different nodes",
+        remedy="compute both on one whole grid, or expand() them",
+        element="second field",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class GridInterpolant:
+    """Multilinear interpolation between nodes; outside the grid, linear extrapolation from the nearest point of it."""
+
+    grid: Grid
+    values: NDArray[Any]  # at the nodes, NaN where there are none
+
+    def __call__(self, points: ArrayLike) -> Floats:
+        """Return (...) values at (..., d) points: of the nodes around those that have one; NaN where none has."""
+        places, shape = query_points(points, self.grid.dimension)
+        (values,) = in_chunks(self._values_at, places)
+        return shaped(values, shape)
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """(..., d) central differences at (..., d) points; outside the grid, those at its nearest point."""
+        places, shape = query_points(points, self.grid.dimension)
+        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), places)
+        return shaped(slopes, shape)
+
+    def _into_box(self, points: Floats) -> Floats:
+        return np.clip(points, self.grid.origin, self.grid.upper)
+
+    def _values_at(self, points: Floats) -> tuple[Floats]:
+        """Return values at (n, d) points, within the box and outside of it."""
+        inside = self._into_box(points)
+        values = self._between(inside)
+        away = points - inside
+        outside = np.flatnonzero(away.any(axis=-1))
+        if len(outside):
+            slopes = self._slopes(inside[outside])
+            values[outside] += np.einsum("ij,ij->i", slopes, away[outside])
+        return (values,)
+
+    def _between(self, points: Floats) -> Floats:
+        """Return values at (n, d) points within the box."""
+        index = ((points - self.grid.origin) / self.grid.spacing).T
+        if self._defined is None:
+            return scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
+        filled, defined = self._defined
+        sums = scipy.ndimage.map_coordinates(filled, index, order=1, mode="nearest")
+        weights = scipy.ndimage.map_coordinates(defined, index, order=1, mode="nearest")
+        return np.where(weights > 0, sums / np.where(weights > 0, weights, 1.0), np.nan)
+
+    @cached_property
+    def _defined(self) -> tuple[Floats, Floats] | None:
+        """The values with 0 in place of NaN, and 1 at nodes with a value, 0 at others; None if all nodes have one."""
+        defined = ~np.isnan(self.values)
+        return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
+
+    def _slopes(self, points: Floats) -> Floats:
+        """Return (n, d) central differences of the interpolant: they equal those at the nodes, interpolated."""
+        slopes = np.empty_like(points)
+        for axis, step in enumerate(self.grid.spacing):
+            ahead, behind = points.copy(), points.copy()
+            ahead[:, axis] = np.minimum(ahead[:, axis] + step, self.grid.upper[axis])
+            behind[:, axis] = np.maximum(behind[:, axis] - step, self.grid.origin[axis])
+            rise = self._between(ahead) - self._between(behind)
+            slopes[:, axis] = rise / (ahead[:, axis] - behind[:, axis])
+        return slopes
 
 
 def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = 0.2) -> float:

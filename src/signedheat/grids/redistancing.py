@@ -23,17 +23,18 @@ from ..calls import public_call
 from ..compiled import compiled
 from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
+from ..fields.field import Field
+from ..fields.solid_queries import Scaled
+from ..grids.band import Band
 from ..jobs import Progress, run_cancellable
 from ..packages import lazy_module
 from ..parallel import PointTree, in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
-from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_field, timed
+from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_on, timed
 from ..validation import array_of, flag, numbers, positive_steps
 from .blocks import BLOCK
 from .grid import Grid
-from .grid_field import GridField
 from .nearest_nodes import Lattice, nearest_at_nodes
-from .solid_queries import Scaled
 from .stencil import padded_shape
 
 
@@ -68,7 +69,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
     See Also
     --------
-    sharpen : The same for a `GridField`.
+    sharpen : The same for a field.
 
     Examples
     --------
@@ -118,8 +119,8 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
     return np.where(given == 0, 0.0, np.copysign(distances, given))
 
 
-@sharpen_field.register
-def _(field: GridField, source: object, method: Method | None, progress: Progress | None) -> GridField:
+@sharpen_on.register
+def _(grid: Grid, field: Field[Grid], source: object, method: Method | None, progress: Progress | None) -> Field[Grid]:
     """Measure the distance of every node to the zero set; a field with its solid holds it already, up to a factor."""
     if source is not None or method is not None:
         raise UnsupportedTypeError(
@@ -129,17 +130,17 @@ def _(field: GridField, source: object, method: Method | None, progress: Progres
         if progress is not None:
             progress(1.0, "done")
         return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
-    if field.blocks is not None:
-        raise GeometryError("a field in a band cannot be sharpened", remedy="use its dense()", element="field")
+    if isinstance(grid, Band):
+        raise GeometryError("a field in a band cannot be sharpened", remedy="use its expand()", element="field")
     if not np.isfinite(field.values).all():
         raise GeometryError(
             "a field with values that are not finite cannot be sharpened",
             remedy="fill them in, or use it as it is",
             element="field",
         )
-    run = partial(distance_to_nearest, field.grid, field.values, None, None, 0.0, progress)
+    run = partial(distance_to_nearest, grid, field.values, None, None, 0.0, progress)
     values, diagnostics = timed(run, field.diagnostics, progress)
-    return GridField(field.grid, values, diagnostics)
+    return Field(grid, values, diagnostics)
 
 
 @nearest.register

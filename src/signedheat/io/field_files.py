@@ -12,19 +12,17 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, GeometryError
 from ..exchange import VALUES_NAME, Elements
-from ..field_kinds import Field
+from ..fields.field import Field
+from ..fields.solid_queries import Scaled, SolidQueries, scaled
 from ..foreign import SurfaceShape, elements, shape_of
+from ..grids.band import Band
 from ..grids.blocks import BLOCK, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
-from ..grids.grid_field import GridField
-from ..grids.solid_queries import Scaled, SolidQueries, scaled
 from ..solids.solid import Solid
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..surfaces.vertex_field import VertexField, on_simple_surface
-from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
 from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
 from .image_files import CONFIDENCE, read_image, write_nrrd
@@ -53,40 +51,44 @@ _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
 """Numbers of axes that a format supports; the others support any number."""
 
 
-def write_field(field: GridField | TetField | VertexField, path: PathLike) -> None:
+def write_field(field: Field[Any], path: PathLike) -> None:
     """Write a field of any kind, in the format given by the extension."""
-    if isinstance(field, GridField):
+    if isinstance(field.domain, Grid):
         save_field(field, path)
-    elif isinstance(field, TetField):
+    elif isinstance(field.domain, TetMesh):
         format_for(path, dict.fromkeys(TET_FIELD_FORMATS), "a field on tets")
-        store_cells(field.mesh.to_meshio({VALUES_NAME: field.values}), path)
-    elif isinstance(field, VertexField):
+        store_cells(field.domain.to_meshio({VALUES_NAME: field.values}), path)
+    else:
         write = format_for(path, {".npz": None, ".obj": write_obj, **VALUE_FORMATS}, "a field on a surface")
-        simple = on_simple_surface(field)
+        simple: Field[Any] = field.plain()
         if write is None:
             return _write_vertex_npz(simple, path)
         with replacing(path) as temporary:
             temporary.write_bytes(write(elements(simple.domain, {VALUES_NAME: simple.values}), path))
 
 
-def save_field(field: GridField, path: PathLike) -> None:
+def save_field(field: Field[Any], path: PathLike) -> None:
     """Write a field on a grid, in the format given by the extension.
 
     ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
     same name next to it, ``.vdb`` (OpenVDB; single precision; not read back).
     """
-    if not isinstance(field, GridField):
-        raise FileFormatError(f"a {type(field).__name__} is not a field on a grid: it has other formats", path=path)
-    if field.grid.dimension not in _DIMENSIONS.get(extension(path), (field.grid.dimension,)):
+    if not isinstance(field.domain, Grid):
+        raise FileFormatError(f"the field lies on a {type(field.domain).__name__}, not on a grid", path=path)
+    if field.domain.dimension not in _DIMENSIONS.get(extension(path), (field.domain.dimension,)):
         raise FileFormatError(
-            f"the field has {field.grid.dimension} axes, which the format does not support",
+            f"the field has {field.domain.dimension} axes, which the format does not support",
             remedy="save it as .npz",
             path=path,
         )
-    ensure_field_writable(path, in_band=field.blocks is not None)
-    write = (_GRID_WRITERS if field.blocks is None else _BAND_WRITERS)[extension(path)]
+    ensure_field_writable(path, in_band=isinstance(field.domain, Band))
+    write = (_GRID_WRITERS if not isinstance(field.domain, Band) else _BAND_WRITERS)[extension(path)]
     if extension(path) == ".npy":
-        about = {"origin": field.grid.origin.tolist(), "spacing": field.grid.spacing.tolist(), "convention": CONVENTION}
+        about = {
+            "origin": field.domain.origin.tolist(),
+            "spacing": field.domain.spacing.tolist(),
+            "convention": CONVENTION,
+        }
         with replacing(Path(path).with_suffix(".json")) as companion, replacing(path) as temporary:
             companion.write_text(json.dumps(about, indent=1) + "\n")
             write(field, temporary)
@@ -112,9 +114,9 @@ def read_field(path: PathLike) -> Field:
 
     Returns
     -------
-    GridField, TetField or VertexField
-        The field; its diagnostics are empty. From ``.npz`` it has the solid that it was the distance to, and is exact
-        between nodes as before; from all other formats it is interpolated.
+    Field
+        Its diagnostics are empty. From ``.npz`` it has the solid that it was the distance to, and is exact between
+        nodes as before. From all other formats it is interpolated.
 
     Raises
     ------
@@ -129,7 +131,7 @@ def read_field(path: PathLike) -> Field:
     Examples
     --------
     >>> import tempfile, numpy as np, signedheat as sh
-    >>> phi = GridField(sh.Grid((0, 0, 0), (0.1, 0.2, 0.3), (2, 3, 4)), np.random.default_rng(0).random((2, 3, 4)))
+    >>> phi = Field(sh.Grid((0, 0, 0), (0.1, 0.2, 0.3), (2, 3, 4)), np.random.default_rng(0).random((2, 3, 4)))
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     save_field(phi, f"{folder}/phi.vti")
     ...     bool((read_field(f"{folder}/phi.vti").values == phi.values).all())
@@ -146,7 +148,7 @@ def read_field(path: PathLike) -> Field:
         raise FileFormatError(
             "OpenVDB files are written and not read",
             remedy="keep the field as .npz too; of others' files, read the values by OpenVDB, which Blender's Python "
-            "has, and pass them to sh.GridField",
+            "has, and pass them to sh.Field",
             path=path,
         )
     image = read_image(path, FIELD_FORMATS - {".vdb"}, "a field")
@@ -157,7 +159,7 @@ def read_field(path: PathLike) -> Field:
             raise FileFormatError("the values are booleans, not real numbers: this is not a field")
         grid = made(Grid, image.origin, image.spacing, image.values.shape)
         solid = _held_solid(path) if extension(path) == ".npz" else None
-        return made(GridField, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
+        return made(Field, grid, np.ascontiguousarray(image.values), confidence=image.confidence, solid=solid)
 
 
 def made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
@@ -168,14 +170,14 @@ def made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
         raise FileFormatError(error.cause, remedy=error.remedy, element=error.element) from error
 
 
-def load_vertex_field(path: PathLike) -> VertexField:
-    """Read a field on a surface that `VertexField.save` has written, in any of its formats but ``.obj``."""
+def load_vertex_field(path: PathLike) -> Field[SurfaceShape]:
+    """Read a field on a surface that `Field.save` has written, in any of its formats but ``.obj``."""
     with reading(path):
         if extension(path) in _VALUES:
             shape = _VALUES[extension(path)](path, (VALUES_NAME,))
             if VALUES_NAME not in shape.values:
                 raise FileFormatError(f"its vertices have no {VALUES_NAME}: it holds a shape, not a field")
-            return VertexField(cast("SurfaceShape", shape_of(shape)), np.asarray(shape.values[VALUES_NAME], np.float64))
+            return Field(cast("SurfaceShape", shape_of(shape)), np.asarray(shape.values[VALUES_NAME], np.float64))
         arrays = read_npz(path, ("faces", "offsets", *OF_CLOUDS), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
@@ -187,27 +189,27 @@ def load_vertex_field(path: PathLike) -> VertexField:
             domain = PointCloud(vertices, **given)
         if values.shape != (len(vertices),):
             raise damaged(f"{values.shape} values for {len(vertices)} vertices: the file is damaged")
-        return VertexField(domain, values)
+        return Field(domain, values)
 
 
-def _load_tet_field(path: PathLike) -> TetField:
+def _load_tet_field(path: PathLike) -> Field[TetMesh]:
     """Read a field on tets."""
     with reading(path):
         cells = load_cells(path)
         if VALUES_NAME not in cells.point_data:
             raise FileFormatError(f"it has no point data '{VALUES_NAME}': it was not written as a field")
         values = np.asarray(cells.point_data[VALUES_NAME], dtype=np.float64)
-        return made(TetField, made(TetMesh.from_meshio, cells), values)
+        return made(Field, made(TetMesh.from_meshio, cells), values)
 
 
-def _load_band(path: PathLike) -> GridField:
+def _load_band(path: PathLike) -> Field[Band]:
     """Read a field in a band from an archive, and refuse blocks that lie outside of its grid or are not in order."""
     needed = ("places", "values", "origin", "spacing", "shape", "width", "coarse_values", "coarse_spacing")
     with reading(path):
         arrays = read_npz(path, (CONFIDENCE,), needed)
         grid = made(Grid, arrays["origin"], arrays["spacing"], arrays["shape"])
         far = arrays["coarse_values"]
-        coarse = made(GridField, made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
+        coarse = made(Field, made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
         places = arrays["places"]
         if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
             raise damaged("its blocks have no places", element="places")
@@ -216,17 +218,18 @@ def _load_band(path: PathLike) -> GridField:
         blocks = Blocks.of(places, grid.shape)
         if not np.array_equal(blocks.places, places):
             raise damaged("its blocks are not in order", element="places")
-        options = {"blocks": blocks, "coarse": coarse, "width": float(arrays["width"]), "solid": _held_solid(path)}
-        return made(GridField, grid, arrays["values"], confidence=arrays.get(CONFIDENCE), **options)
+        band = made(Band, grid, blocks, float(arrays["width"]))
+        options = {"confidence": arrays.get(CONFIDENCE), "solid": _held_solid(path)}
+        return made(Field, band, arrays["values"], coarse=coarse, **options)
 
 
-def _write_npz(field: GridField, path: Path) -> None:
+def _write_npz(field: Field[Grid], path: Path) -> None:
     """Write a field to an archive, with its solid; a band is written as its blocks and the coarse field around them."""
-    arrays: dict[str, Any] = {"values": field.values, "origin": field.grid.origin, "spacing": field.grid.spacing}
+    arrays: dict[str, Any] = {"values": field.values, "origin": field.domain.origin, "spacing": field.domain.spacing}
     arrays |= {CONFIDENCE: field.confidence, "convention": CONVENTION}
-    if field.blocks is not None:
-        arrays |= {"places": field.blocks.places, "shape": field.grid.shape, "width": field.width}
-        arrays |= {"coarse_values": field.whole.values, "coarse_spacing": field.whole.grid.spacing}
+    if isinstance(field.domain, Band) and field.coarse is not None:
+        arrays |= {"places": field.domain.blocks.places, "shape": field.domain.shape, "width": field.domain.width}
+        arrays |= {"coarse_values": field.coarse.values, "coarse_spacing": field.coarse.domain.spacing}
         arrays["convention"] = OF_BANDS
     solid = field.solid.solid if isinstance(field.solid, Scaled) else field.solid
     if isinstance(solid, Solid):
@@ -248,16 +251,16 @@ def _held_solid(path: PathLike) -> SolidQueries | None:
     return scaled(solid_of({name.removeprefix(PREFIX): array for name, array in arrays.items()}), float(factor))
 
 
-def _write_npy(field: GridField, path: Path) -> None:
+def _write_npy(field: Field[Grid], path: Path) -> None:
     with path.open("wb") as file:
         np.save(file, field.values, allow_pickle=False)
 
 
-def _write_for_vtk(field: GridField, path: Path) -> None:
+def _write_for_vtk(field: Field[Any], path: Path) -> None:
     """Write values at all nodes of the grid, also for a band, for ParaView and solvers."""
-    grid, convention = field.grid, CONVENTION
+    grid, convention = field.domain, CONVENTION
     values: dict[str, NDArray[np.floating]] = {VALUES_NAME: field.values}
-    if field.blocks is not None:
+    if isinstance(field.domain, Band):
         refuse_large_grid(grid, 20.0, 0.0)  # bytes for each node
         values, convention = {VALUES_NAME: whole_values(field)}, CLIPPED
     elif field.confidence is not None:
@@ -265,18 +268,17 @@ def _write_for_vtk(field: GridField, path: Path) -> None:
     path.write_bytes(write_vti(grid.origin, grid.spacing, values, convention))
 
 
-def _write_nrrd(field: GridField, path: Path) -> None:
-    axes = np.diag(field.grid.spacing)
-    write_nrrd(path, field.values, axes, field.grid.origin, content=VALUES_NAME, convention=CONVENTION)
+def _write_nrrd(field: Field[Grid], path: Path) -> None:
+    axes = np.diag(field.domain.spacing)
+    write_nrrd(path, field.values, axes, field.domain.origin, content=VALUES_NAME, convention=CONVENTION)
 
 
-def whole_values(field: GridField) -> NDArray[np.float32]:
+def whole_values(field: Field[Band]) -> NDArray[np.float32]:
     """Return the values of a band at all nodes of its grid; beyond the band they are plus or minus its half width."""
-    assert field.blocks is not None
-    grid, width = field.grid, np.float32(field.width)
+    grid, width = field.domain, np.float32(field.domain.width)
     counts = -(-np.array(grid.shape) // BLOCK)
     places = np.argwhere(np.ones(counts, dtype=bool))
-    rows = field.blocks.rows(places)
+    rows = field.domain.blocks.rows(places)
     middles = np.minimum(places[rows < 0] * BLOCK + 0.5 * (BLOCK - 1), np.array(grid.shape) - 1)
     parts = np.full((len(places), BLOCK, BLOCK, BLOCK), width, dtype=np.float32)
     parts[rows < 0] *= np.where(field(grid.origin + middles * grid.spacing) < 0, -1, 1)[:, None, None, None]
@@ -294,7 +296,7 @@ def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDA
         temporary.write_bytes(VALUE_FORMATS[extension(path)](elements(shape, {name: values}), path))
 
 
-def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
+def _write_vertex_npz(field: Field[SurfaceShape], path: PathLike) -> None:
     domain = field.domain
     arrays: dict[str, Any] = {"values": field.values, "vertices": elements(domain).points}
     if isinstance(domain, TriangleMesh):
@@ -309,7 +311,7 @@ def _write_vertex_npz(field: VertexField[SurfaceShape], path: PathLike) -> None:
 _VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": read_ply, ".vtp": read_vtp}
 VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {".ply": write_ply, ".vtp": write_vtp}
 """Formats of surfaces with values at their vertices."""
-_GRID_WRITERS: dict[str, Callable[[GridField, Path], None]] = {
+_GRID_WRITERS: dict[str, Callable[[Field[Any], Path], None]] = {
     ".npy": _write_npy,
     ".npz": _write_npz,
     ".nrrd": _write_nrrd,

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..diagnostics import SampledSource
+from ..fields.field import Field
 from ..foreign import as_shape
-from ..grids.grid_field import GridField
+from ..grids.band import Band
+from ..grids.grid import Grid
 from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..mesh.welding import indexed
 from ..solids.mesh_orientation import Orientation, orientation
@@ -24,18 +26,18 @@ Report = SurfaceReport | CloudReport | TetReport
 
 def describe(field: Any) -> dict[str, Any]:
     """Return key figures of a field, for ``--json``."""
-    if isinstance(field, GridField):
+    if isinstance(field.domain, Grid):
         note = field.diagnostics.note(SampledSource)
         where = {
-            "origin": field.grid.origin.tolist(),
-            "spacing": field.grid.spacing.tolist(),
-            "shape": list(field.grid.shape),
+            "origin": field.domain.origin.tolist(),
+            "spacing": field.domain.spacing.tolist(),
+            "shape": list(field.domain.shape),
             "area_outside": note.area_outside if note else 0.0,
             "area_cancelled": note.area_cancelled if note else 0.0,
-            "confidence": field.surface_confidence,
+            "confidence": surface_confidence(field),
         }
-        if field.blocks is not None:
-            where |= {"band": field.width, "blocks": len(field.blocks), "nodes": field.n_nodes}
+        if isinstance(field.domain, Band):
+            where |= {"band": field.domain.width, "blocks": len(field.domain.blocks), "nodes": field.values.size}
     else:
         where = {"n_vertices": len(field.values)}
     return {
@@ -45,6 +47,15 @@ def describe(field: Any) -> dict[str, Any]:
         "notes": {snake(type(note).__name__): note.as_dict() for note in field.diagnostics.notes},
         "seconds": {step: round(seconds, 4) for step, seconds in field.diagnostics.timings.items()},
     }
+
+
+def surface_confidence(field: Field[Grid]) -> float | None:
+    """Mean confidence at the nodes within a cell of the zero set; None without confidence or such nodes."""
+    cell = float(field.domain.spacing.max())
+    near = (field.values < cell) & (field.values > -cell)
+    if field.confidence is None or not near.any():
+        return None
+    return float(field.confidence[near].mean(dtype=np.float64))
 
 
 def snake(name: str) -> str:

@@ -11,7 +11,7 @@ from ..calls import public_call
 from ..errors import FileFormatError
 from ..exchange import Elements
 from ..foreign import ForeignShape, as_shape, elements, shape_of
-from ..grids.grid_field import GridField
+from ..grids.grid import Grid
 from ..kinds import Shape
 from ..memory import refuse_beyond_memory
 from ..solids.sample_set import Layout, Samples
@@ -40,7 +40,7 @@ def read_archive(path: PathLike) -> Solid | TriangleMesh:
     if holds_solid(path):
         return read_solid(path)
     field = read_field(path)
-    if not isinstance(field, GridField) or field.grid.dimension != 3:
+    if not isinstance(field.domain, Grid) or field.domain.dimension != 3:
         raise FileFormatError("it has no solid, and no field on a grid in space", remedy="load it by `read_field`")
     return field.solid if isinstance(field.solid, Solid) else cast("TriangleMesh", field.offset(0.0))
 

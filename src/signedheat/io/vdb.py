@@ -12,7 +12,7 @@ import uuid
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..errors import FileFormatError
 from ..exchange import VALUES_NAME
+from ..fields.field import Field
+from ..grids.band import Band
 from ..grids.blocks import BLOCK, Blocks
-from ..grids.grid_field import GridField
+from ..grids.grid import Grid
 from .files import PathLike, format_for, replacing
 
 VDB_MAGIC, VDB_VERSION, VDB_LIBRARY = 0x56444220, 224, (10, 0)
@@ -49,7 +51,7 @@ class _Tree:
     outside: Outside  # values where there are no blocks
 
 
-def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
+def write_vdb(field: Field[Grid], path: PathLike, half: bool = False) -> None:
     """Write a field in space as a ``.vdb`` file, single precision, without OpenVDB.
 
     A field in a band becomes a level set: voxels up to its half width are active, and the others have plus or minus
@@ -57,7 +59,8 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
 
     Parameters
     ----------
-    field : GridField in space
+    field : Field
+        On a grid in space or in a band.
         The field. Nodes without a value become inactive.
     path : str or path
         The file; written under a temporary name and renamed.
@@ -72,7 +75,7 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
 
     See Also
     --------
-    GridField : Values on a grid.
+    Field : Values on a domain.
     read_field : Read a field.
 
     Examples
@@ -84,9 +87,9 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
     ...     write_vdb(ball, f"{folder}/ball.vdb")
     """
     format_for(path, {".vdb": None}, "an OpenVDB grid")
-    if not isinstance(field, GridField) or field.grid.dimension != 3:
+    if not isinstance(field, Field) or not isinstance(field.domain, Grid) or field.domain.dimension != 3:
         raise FileFormatError("an OpenVDB grid has three axes", remedy="save the field by its own `save`", path=path)
-    tree = _band(field) if field.blocks is not None else _whole(field)
+    tree = _band(cast("Field[Band]", field)) if isinstance(field.domain, Band) else _whole(field)
     largest = float(np.abs(tree.values).max())
     if half and largest > MOST_HALF:
         raise FileFormatError(
@@ -96,21 +99,20 @@ def write_vdb(field: GridField, path: PathLike, half: bool = False) -> None:
         )
     metadata: dict[str, str | bool] = {
         "name": VALUES_NAME,
-        "class": "level set" if field.blocks is not None else "unknown",
+        "class": "level set" if isinstance(field.domain, Band) else "unknown",
         "creator": "signedheat",
         "convention": VDB_CONVENTION,
-        "spacing": " ".join(map(repr, field.grid.spacing.tolist())),
-        "shape": " ".join(map(str, field.grid.shape)),
+        "spacing": " ".join(map(repr, field.domain.spacing.tolist())),
+        "shape": " ".join(map(str, field.domain.shape)),
         "is_saved_as_half_float": half,
     }
     with replacing(path) as temporary, temporary.open("wb") as file:
-        _write_file(file, tree, metadata, field.grid.origin, field.grid.spacing, half)
+        _write_file(file, tree, metadata, field.domain.origin, field.domain.spacing, half)
 
 
-def _band(field: GridField) -> _Tree:
+def _band(field: Field[Band]) -> _Tree:
     """Return the tree of a band; outside the blocks, values are the background with the sign of the coarse field."""
-    assert field.blocks is not None
-    grid, background = field.grid, np.float32(field.width)
+    grid, background = field.domain, np.float32(field.domain.width)
     finite = ~np.isnan(field.values)
     values = np.where(finite, np.clip(field.values, -background, background), background)
 
@@ -123,12 +125,12 @@ def _band(field: GridField) -> _Tree:
         return result
 
     active = finite & (np.abs(field.values) < background)
-    return _in_order(field.blocks, values, active, background, outside)
+    return _in_order(field.domain.blocks, values, active, background, outside)
 
 
-def _whole(field: GridField) -> _Tree:
+def _whole(field: Field[Grid]) -> _Tree:
     """Return the tree of all nodes of a grid; nodes without a value, and padding of the last blocks, are inactive."""
-    shape = field.grid.shape
+    shape = field.domain.shape
     counts = -(-np.array(shape) // BLOCK)
     background = np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))
     padded = np.full(counts * BLOCK, np.nan, dtype=np.float32)

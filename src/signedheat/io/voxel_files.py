@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Frozen, read_only, short
 from ..errors import FileFormatError, GeometryError
 from ..exchange import VALUES_NAME
+from ..fields.field import Field
 from ..foreign import Represented
 from ..grids.grid import Grid
-from ..grids.grid_field import GridField
 from ..packages import require
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -200,12 +200,13 @@ class LabelImage(Represented, Frozen):
         """
         return cast("Mesh", transform(surface, self.matrix))
 
-    def save(self, field: GridField, path: PathLike) -> None:
+    def save(self, field: Field[Grid], path: PathLike) -> None:
         """Write a field along the axes of the image into its place in the world.
 
         Parameters
         ----------
-        field : GridField
+        field : Field
+            On a grid or in a band.
             On `grid`, or another one along the same axes.
         path : str or path
             ``.nrrd`` or ``.nii`` or ``.nii.gz`` (with nibabel); other formats of fields where the axes of the image are
@@ -225,9 +226,9 @@ class LabelImage(Represented, Frozen):
         ...     image.save(sh.signed_distance(image.surface(7), image.grid), f"{folder}/distance.nrrd")
         """
         self.ensure_writable(path)
-        field = field.dense()  # images have a value at every voxel
-        first = self.matrix[:3, :3] @ field.grid.origin + self.origin
-        axes = self.axes * (field.grid.spacing / self.spacing)
+        field = cast("Field[Grid]", field.expand())  # images have a value at every voxel
+        first = self.matrix[:3, :3] @ field.domain.origin + self.origin
+        axes = self.axes * (field.domain.spacing / self.spacing)
         if extension(path) in NIFTI:
             with replacing(path) as temporary:
                 temporary.write_bytes(self._nifti(field, axes, first, path))
@@ -235,7 +236,7 @@ class LabelImage(Represented, Frozen):
             with replacing(path) as temporary:
                 write_nrrd(temporary, field.values, axes, first, self.space, content=VALUES_NAME, convention=CONVENTION)
         else:
-            save_field(replace(field, grid=Grid(first, field.grid.spacing, field.grid.shape), solid=None), path)
+            save_field(replace(field, domain=Grid(first, field.domain.spacing, field.domain.shape), solid=None), path)
 
     def ensure_writable(self, path: PathLike) -> None:
         """Check before a long computation that a field can be written into the place of the image.
@@ -275,7 +276,7 @@ class LabelImage(Represented, Frozen):
         voxels = " × ".join(map(str, self.labels.shape))
         return f"LabelImage({voxels} voxels of {short(self.spacing)}, {_listed(np.unique(self.labels))})"
 
-    def _nifti(self, field: GridField, axes: Floats, first: Floats, path: PathLike) -> bytes:
+    def _nifti(self, field: Field[Grid], axes: Floats, first: Floats, path: PathLike) -> bytes:
         affine = np.eye(4)
         affine[:3, :3], affine[:3, 3] = axes, first
         signs = SPACES[self.space] if self.space is not None else (1, 1, 1)

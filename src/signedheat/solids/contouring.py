@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import SMALL_SHARE
 from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
-from ..field_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
+from ..grids.exact_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.grid import Grid
 from ..jobs import Progress
 from ..memory import available_memory, libraries, refuse_beyond_memory
@@ -375,7 +375,7 @@ def traced(
     nodes, axes = crossings.nodes, crossings.axes
     guesses = nodes.astype(np.float64)
     guesses[np.arange(len(nodes)), axes] += np.clip(crossings.shares, CLEARANCE, 1 - CLEARANCE)
-    points = on_level(offset.distance, guesses, values, grid, 0.0)
+    points = on_level(offset.distance, guesses, values, grid.origin, grid.spacing, 0.0)
     shares = ((points - grid.origin) / grid.spacing - nodes)[np.arange(len(nodes)), axes]
     report(0.6, "vertices")
     choices = placed(offset, grid, cells, points)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Bools, Floats
 from ..calls import public_call
 from ..errors import GeometryError, OutsideError, SignedHeatError
-from ..field_levels import on_level
+from ..grids.exact_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
@@ -218,7 +218,7 @@ def contour(
         raise OutsideError(f"the function is below level {height:g} everywhere", remedy="choose another level")
     if not is_sharp:
         points, faces = closed_surface(values, grid.spacing, 0.0)
-        return TriangleMesh(on_level(surface.distance, points, values, grid, 0.0), faces)
+        return TriangleMesh(on_level(surface.distance, points, values, grid.origin, grid.spacing, 0.0), faces)
     return TriangleMesh(*traced(surface, grid, values, *crossed_between(values, grid), lambda fraction, step: None))
 
 

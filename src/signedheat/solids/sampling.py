@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..calls import public_call
 from ..errors import OutsideError, SignedHeatError, SourceError
-from ..grids.grid_field import GridField
+from ..fields.field import Field
+from ..grids.grid import Grid
 from ..kinds import Shapes
 from ..memory import refuse_beyond_memory
 from ..mesh.triangles import bent_edges, face_areas
@@ -26,7 +27,7 @@ BYTES_PER_SAMPLE = 165
 
 @public_call
 def sample_distances(
-    shape: GridField | Shapes,
+    shape: Field[Grid] | Shapes,
     n: int = 250_000,
     *,
     near: float = 0.8,
@@ -40,7 +41,7 @@ def sample_distances(
 
     Parameters
     ----------
-    shape : GridField, Solid or shape
+    shape : Field, Solid or shape
         A distance in space, from `signed_distance` or ``sharpen(field, shape)``; a solid; or a shape, completed here.
     n : int
         Number of points.
@@ -93,7 +94,7 @@ def sample_distances(
         )
     scales = [finite_number(width, "the width of the noise", least=0) for width in np.atleast_1d(widths)]
     n_near = round(near * n)
-    solid = shape.solid if isinstance(shape, GridField) else complete(shape)
+    solid = shape.solid if isinstance(shape, Field) else complete(shape)
     if solid is None or solid.triangles.shape[-1] != 3:
         raise SourceError(
             "the field does not hold its solid",

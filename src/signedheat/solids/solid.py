@@ -14,12 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Bools, Floats, Frozen, Ints, short
 from ..calls import public_call, refuse_uncallable
 from ..diagnostics import CompletedArea, Diagnostics, Note
-from ..errors import InexactWarning, SourceError, warn_user
+from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from ..exchange import Displayed
+from ..fields.field import Field
+from ..fields.solid_queries import Closest
 from ..foreign import Represented
+from ..grids.band import Band
 from ..grids.grid import RESOLUTION, Grid
-from ..grids.grid_field import GridField
-from ..grids.solid_queries import Closest
 from ..jobs import Progress
 from ..mesh.box_tree import order_in_space
 from ..mesh.triangles import area_vectors, face_areas
@@ -62,7 +63,7 @@ class Solid(Displayed, Represented, Frozen):
     ½. Every function that takes a shape also takes a solid, and does not complete it again.
 
     ``a | b``, ``a & b`` and ``a - b`` are the union, intersection and difference of two solids. Their triangles are cut
-    where they cross and kept where they bound the result; open sheets are ignored. If one of the two is a `GridField`,
+    where they cross and kept where they bound the result; open sheets are ignored. If one of the two is a `Field`,
     the result is a field on its grid, which is not exact between nodes.
 
     Attributes
@@ -277,7 +278,7 @@ class Solid(Displayed, Represented, Frozen):
         store: str | PathLike[str] | None = None,
         scheduler: Scheduler = None,
         progress: Progress | None = None,
-    ) -> GridField[Literal[3]]:
+    ) -> Field[Grid[Literal[3]]]:
         """Compute the signed distance at the nodes of a grid.
 
         Parameters
@@ -303,8 +304,8 @@ class Solid(Displayed, Represented, Frozen):
 
         Returns
         -------
-        GridField
-            Its calls, closest places and contours are exact, since it keeps the solid.
+        Field
+            On the grid, or a `Band` of it. Its calls, closest places and contours are exact, since it keeps the solid.
 
         Raises
         ------
@@ -330,7 +331,7 @@ class Solid(Displayed, Represented, Frozen):
             where = Grid.around(self.bounds, RESOLUTION if resolution is None else resolution, padding, spacing)
         else:
             refuse_beside("a grid", resolution=resolution, spacing=spacing, padding=padding)
-            where = grid
+            where = grid.grid if isinstance(grid, Band) else grid
         if scheduler is not None and store is None:
             raise SourceError("a scheduler computes the tiles of a store", remedy="name a store", element="scheduler")
         if band is not None:
@@ -602,60 +603,69 @@ class Solid(Displayed, Represented, Frozen):
     @overload
     def __or__(self, other: Solid) -> Solid: ...
     @overload
-    def __or__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
-    def __or__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
+    def __or__(self, other: Field[Grid[Literal[3]]]) -> Field[Grid[Literal[3]]]: ...
+    def __or__(self, other: Solid | Field[Grid[Literal[3]]]) -> Solid | Field[Grid[Literal[3]]]:
         """Union: points in either of the two."""
-        if isinstance(other, GridField):
+        if isinstance(other, Field):
             return self.field_on(other) | other
         return unions.union(self, other) if isinstance(other, Solid) else NotImplemented
 
     @overload
     def __and__(self, other: Solid) -> Solid: ...
     @overload
-    def __and__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
-    def __and__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
+    def __and__(self, other: Field[Grid[Literal[3]]]) -> Field[Grid[Literal[3]]]: ...
+    def __and__(self, other: Solid | Field[Grid[Literal[3]]]) -> Solid | Field[Grid[Literal[3]]]:
         """Intersection: points in both."""
-        if isinstance(other, GridField):
+        if isinstance(other, Field):
             return self.field_on(other) & other
         return unions.intersection(self, other) if isinstance(other, Solid) else NotImplemented
 
     @overload
     def __sub__(self, other: Solid) -> Solid: ...
     @overload
-    def __sub__(self, other: GridField[Literal[3]]) -> GridField[Literal[3]]: ...
-    def __sub__(self, other: Solid | GridField[Literal[3]]) -> Solid | GridField[Literal[3]]:
+    def __sub__(self, other: Field[Grid[Literal[3]]]) -> Field[Grid[Literal[3]]]: ...
+    def __sub__(self, other: Solid | Field[Grid[Literal[3]]]) -> Solid | Field[Grid[Literal[3]]]:
         """Difference: points in this and not in the other."""
-        if isinstance(other, GridField):
+        if isinstance(other, Field):
             return self.field_on(other) - other
         return unions.difference(self, other) if isinstance(other, Solid) else NotImplemented
 
-    def field_on(self, field: GridField[Literal[3]]) -> GridField[Literal[3]]:
+    def field_on(self, field: Field[Grid[Literal[3]]]) -> Field[Grid[Literal[3]]]:
         """Compute the distance at the nodes of a field, in a band or everywhere.
 
         Parameters
         ----------
-        field : GridField
-            In space.
+        field : Field
+            On a grid in space or in a band.
 
         Returns
         -------
-        GridField
+        Field
             Has values at the same nodes.
 
         Examples
         --------
         >>> from signedheat import complete, samples
         >>> ball, cube = complete(samples.sphere(2)), complete(samples.sphere(1, radius=0.5))
-        >>> ball.field_on(cube.field(resolution=8)).grid.shape
+        >>> ball.field_on(cube.field(resolution=8)).domain.shape
         (8, 8, 8)
         """
-        return self.field(grid=field.grid, band=None if field.blocks is None else field.width)
+        domain = field.domain
+        if not isinstance(domain, Grid):
+            raise UnsupportedTypeError(
+                f"a solid is not combined with a field on a {type(domain).__name__}",
+                remedy="combine it with one on a grid",
+                element=type(domain).__name__,
+            )
+        if isinstance(domain, Band):
+            return self.field(grid=domain.grid, band=domain.width)
+        return self.field(grid=domain)
 
-    def _surface_on(self, field: GridField[Literal[3]], level: float) -> TriangleMesh:
+    def _surface_on(self, field: Field[Grid[Literal[3]]], level: float) -> TriangleMesh:
         # as blocks of the grid hold them, so that both ways give the same mesh
         heights = field.values.astype(np.float32).astype(np.float64) - level
         rounded = heights.astype(np.float32).astype(np.float64)
-        return sharp_surface(Offset(self, level), field.grid, heights=rounded)
+        return sharp_surface(Offset(self, level), field.domain, heights=rounded)
 
     def to_pyvista(self) -> pyvista.PolyData:
         return self.boundary.to_pyvista()

@@ -27,12 +27,13 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, fingerprint
 from ..diagnostics import Diagnostics, Note
 from ..errors import FileFormatError, MemoryLimitError, OutsideError, SignedHeatError, UnsupportedTypeError
+from ..fields.field import Field
+from ..fields.solid_queries import SolidQueries
+from ..grids.band import Band
 from ..grids.blocks import BLOCK, BLOCK_NODES, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
-from ..grids.grid_field import GridField
 from ..grids.nearest_nodes import SQUARE_ROUNDING, Lattice, nearest_at_nodes
-from ..grids.solid_queries import SolidQueries
 from ..jobs import Progress
 from ..memory import available_memory, libraries
 from ..packages import lazy_module
@@ -75,7 +76,7 @@ class Evaluated(SolidQueries, Protocol):
     def diagnostics(self) -> Diagnostics: ...  # notes on faces that were flipped, left out and added
 
 
-def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> GridField[Literal[3]]:
+def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Field[Grid[Literal[3]]]:
     """Compute the signed distance to a solid at all nodes of a grid."""
     refuse_plane_grid(grid)
     refuse_large_grid(grid, BYTES_PER_DENSE_NODE, BYTES_AT_WORK)
@@ -95,7 +96,7 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Grid
         values[window], confidence[window] = distances, trusted
         if progress is not None:
             progress((done + 1) / len(firsts), "distance")
-    return cast("GridField[Literal[3]]", GridField(grid, values, solid.diagnostics, confidence, solid=solid))
+    return cast("Field[Grid[Literal[3]]]", Field(grid, values, solid.diagnostics, confidence=confidence, solid=solid))
 
 
 def band_field(
@@ -105,7 +106,7 @@ def band_field(
     store: str | PathLike[str] | None,
     scheduler: Scheduler,
     progress: Progress | None,
-) -> GridField[Literal[3]]:
+) -> Field[Grid[Literal[3]]]:
     """Compute the signed distance up to `width` from a solid, in memory or a store, and on a coarse grid everywhere."""
     refuse_plane_grid(grid)
     width = positive_number(width, "band")
@@ -139,8 +140,8 @@ def band_field(
     else:
         values, confidence, note = in_store(Path(store), tree, windings, grid, blocks, tiles, scheduler, progress)
         diagnostics = diagnostics.noting(note)
-    field = GridField(grid, values, diagnostics, confidence, solid=solid, blocks=blocks, coarse=coarse, width=width)
-    return cast("GridField[Literal[3]]", field)
+    field = Field(Band(grid, blocks, width), values, diagnostics, confidence=confidence, solid=solid, coarse=coarse)
+    return cast("Field[Grid[Literal[3]]]", field)
 
 
 def distances_in(

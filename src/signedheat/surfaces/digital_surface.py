@@ -171,6 +171,9 @@ class DigitalSurface(Displayed, Surface):
     def on_triangulation(self, values: Floats) -> Floats:
         return self.squares.on_triangulation(values)
 
+    def _plain(self, values: Floats) -> tuple[TriangleMesh, Floats]:
+        return self.triangulation, self.on_triangulation(values)
+
     def _triangle_mask(self, face_mask: Bools) -> Bools:
         return self.squares._triangle_mask(face_mask)
 

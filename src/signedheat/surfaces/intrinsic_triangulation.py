@@ -21,6 +21,7 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..calls import public_call
 from ..errors import GeometryError
 from ..exchange import Displayed
+from ..fields.field_domain import Exact
 from ..foreign import ForeignShape, converted
 from ..jobs import Progress, Stopwatch, within
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
@@ -28,13 +29,13 @@ from ..mesh.gluing import N_STEPS, flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
-from ..validation import finite_rows, flag, frozen, whole_numbers
+from ..validation import finite_rows, flag, frozen, shaped, whole_numbers
 from ..words import counted
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
 from .source_segments import curve_of_elements, given_curves, is_element_list, segments_of, segments_of_each
-from .surface import checked_levels, is_consistent, level_set, without_repeats
+from .surface import LinearDomain, checked_levels, is_consistent, level_set, placed, without_repeats
 from .surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from .triangle_mesh import TriangleMesh
 
@@ -48,11 +49,11 @@ GENERIC_DIRECTION = (np.pi / 4) ** np.arange(3)
 
 
 @dataclass(frozen=True, eq=False)
-class IntrinsicTriangulation(Displayed, Frozen):
+class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
     """An intrinsic triangulation of a mesh, made by `intrinsic_delaunay`; a domain like the mesh itself.
 
     The first vertices are those of the mesh, with the same ids. Sources are given on the mesh; fields have values at
-    all vertices, and `VertexField.restrict` returns those at the vertices of the mesh.
+    all vertices, and `Field.restrict` returns those at the vertices of the mesh.
 
     Attributes
     ----------
@@ -362,12 +363,40 @@ class IntrinsicTriangulation(Displayed, Frozen):
             return seen
         return transfer_segments(seen, self.refinement, self.history, self.base)
 
+    def _interpolant(self, values: Floats, beyond: Exact | None) -> IntrinsicInterpolant:
+        return IntrinsicInterpolant(self, values)
+
+    def _restricted(self) -> TriangleMesh:
+        return self.mesh
+
+    def _plain(self, values: Floats) -> tuple[TriangleMesh, Floats]:
+        return self.mesh, values[: self.mesh.n_vertices]
+
     def to_pyvista(self) -> pyvista.PolyData:
         return self.mesh.to_pyvista()
 
     def __repr__(self) -> str:
         size = f"{counted(self.n_vertices, 'vertex')}, {counted(self.n_faces, 'face')}"
         return f"IntrinsicTriangulation({size}: {self.summary})"
+
+
+@dataclass(frozen=True, eq=False)
+class IntrinsicInterpolant:
+    """Linear interpolation in the triangles of an intrinsic triangulation; points are given on its mesh."""
+
+    triangulation: IntrinsicTriangulation
+    values: Floats  # at its vertices
+
+    def __call__(self, points: object) -> Floats:
+        """Return (...) values at points that `placed` takes."""
+        faces, weights, shape = placed(self.triangulation.mesh, points)
+        faces, weights = self.triangulation.locate(faces, weights)
+        return shaped(np.einsum("ik,ik->i", weights, self.values[self.triangulation.faces[faces]]), shape)
+
+    def gradient(self, points: object) -> Floats:
+        """(..., 3) gradients in space."""
+        faces, weights, shape = placed(self.triangulation.mesh, points)
+        return shaped(self.triangulation.gradient(self.values, faces, weights), shape)
 
 
 @public_call

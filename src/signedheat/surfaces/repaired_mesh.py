@@ -10,12 +10,12 @@ import numpy as np
 
 from ..arrays import Ints
 from ..diagnostics import Note
+from ..fields.field import Field
 from ..mesh.edges import orient_faces, pair_halfedges
 from ..mesh.welding import coincident_faces
 from .surface_curves import Curve, SurfacePoints
 from .surface_discretization import vertices_joined
 from .triangle_mesh import TriangleMesh
-from .vertex_field import VertexField
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,11 +80,11 @@ class RepairedMesh:
             return SurfacePoints(self.faces[faces], weights)
         return Curve(self.faces[faces], weights, source.closed, source.oriented, source.normals)
 
-    def on_given(self, field: VertexField[Any]) -> VertexField[Any]:
+    def on_given(self, field: Field[Any]) -> Field[Any]:
         """Return a field on the repaired mesh, at the vertices of the given one."""
         values = field.values[self.places]
         diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(*self.notes)
-        return VertexField(self.given, values, diagnostics)
+        return Field(self.given, values, diagnostics)
 
     def curve_on_given(self, curve: Curve) -> Curve:
         """Return a curve on the repaired mesh as one on the given mesh; of copies of a face, it is on the first."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..calls import public_call
-from ..errors import SourceError
+from ..errors import OutsideError, SourceError
+from ..fields.field_domain import Exact, FieldDomain
 from ..geodesics.shortest_paths import join
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.polylines import assemble_polylines, leaving
@@ -22,10 +25,10 @@ from ..mesh.surface_points import (
     locate_points,
     refuse_missing,
 )
-from ..mesh.triangles import Triangles, area_vectors
+from ..mesh.triangles import Triangles, area_vectors, gradients_along
 from ..packages import lazy_module
 from ..search.nearest_triangles import TriangleTree
-from ..validation import array_of, coordinates, finite_number, flag, numbers
+from ..validation import array_of, coordinates, finite_number, flag, numbers, query_points, shaped
 from .surface_curves import Curve, CurveOrPoints, SurfacePoints
 
 surface_paths: Any = lazy_module("signedheat.surfaces.surface_paths", "shortest paths")
@@ -148,7 +151,34 @@ def is_consistent(mesh: Triangles) -> bool:
     return bool((edges.face_counts + np.abs(edges.balance) <= 2).all())
 
 
-class Surface(Frozen):
+class LinearDomain(FieldDomain):
+    """A surface along which fields are linear in each triangle; their level sets are curves."""
+
+    level_set: Callable[[Floats, float], list[Curve]]
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of values that a field on the surface has."""
+        raise NotImplementedError
+
+    @property
+    def _values_shape(self) -> tuple[int, ...]:
+        return (self.n_vertices,)
+
+    def _level_set(self, values: Floats, level: float, exact: Exact | None) -> list[Curve]:
+        finite = values[np.isfinite(values)]
+        low, high = (float(finite.min()), float(finite.max())) if len(finite) else (np.nan, np.nan)
+        least = 1e-12 * max(high - low, 0.0)
+        if not low - least <= level <= high + least:
+            raise OutsideError(
+                f"φ does not reach level {level:g}: it goes from {low:g} to {high:g}",
+                remedy="choose a level in between",
+                element=f"level {level:g}",
+            )
+        return self.level_set(values, level)
+
+
+class Surface(Frozen, LinearDomain):
     """A domain on which curves and points can be placed.
 
     Face ids of curves and points refer to `triangulation`, vertex ids to the domain.
@@ -163,6 +193,9 @@ class Surface(Frozen):
     def n_vertices(self) -> int:
         """Number of values that a field on the surface has."""
         return self.triangulation.n_vertices
+
+    def _interpolant(self, values: Floats, beyond: Exact | None) -> SurfaceInterpolant:
+        return SurfaceInterpolant(self.triangulation, self.on_triangulation(values))
 
     def on_triangulation(self, values: Floats) -> Floats:
         """Extend values at the vertices of the domain to the vertices of `triangulation`.
@@ -502,3 +535,40 @@ def closest_points(mesh: PlaceableTriangles, points: Floats) -> tuple[Ints, Floa
     faces, weights = mesh.search_tree.nearest(points)
     closest = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])
     return faces, weights, np.linalg.norm(points - closest, axis=1)
+
+
+def placed(mesh: PlaceableTriangles, points: object) -> tuple[Ints, Floats, tuple[int, ...]]:
+    """(n,) faces of points and (n, 3) barycentric coordinates in them, and the shape that the points have.
+
+    Points are those of a curve, `SurfacePoints`, or positions in space, for which the closest points are taken.
+    """
+    if isinstance(points, Curve | SurfacePoints):
+        refuse_missing("face", points.faces, mesh.n_faces)
+        return points.faces, points.barycentric, points.faces.shape
+    places, shape = query_points(points, 3)
+    faces, weights, _ = closest_points(mesh, places)
+    return faces, weights, shape
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceInterpolant:
+    """Linear interpolation in the triangles of a surface."""
+
+    mesh: PlaceableTriangles
+    values: NDArray[Any]  # at the vertices of the triangles
+
+    def __call__(self, points: object) -> Floats:
+        """Return (...) values at points that `placed` takes."""
+        faces, weights, shape = placed(self.mesh, points)
+        return shaped(np.einsum("ik,ik->i", weights, self.values[self.mesh.faces[faces]]), shape)
+
+    def gradient(self, points: object) -> Floats:
+        """(..., 3) gradients in space."""
+        faces, _, shape = placed(self.mesh, points)
+        return shaped(self.cell_gradients[faces], shape)
+
+    @cached_property
+    def cell_gradients(self) -> Floats:
+        """(m, 3) gradients in the triangles, in space; zero in those without area."""
+        corners, values = self.mesh.vertices[self.mesh.faces], self.values[self.mesh.faces]
+        return gradients_along(corners[:, 1:] - corners[:, :1], values[:, 1:] - values[:, :1])

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
-from typing import Any, cast
 
 import numpy as np
 
@@ -16,23 +15,25 @@ from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import GeodesicWindows, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
+from ..fields.field import Field
 from ..foreign import as_list
 from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares, zero_line
 from ..jobs import Progress
+from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, VERTEX, incident_faces
 from ..search.face_tree import EQUALLY_NEAR
-from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
+from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
+from ..surfaces.surface import Surface
 from ..words import percent
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .source_segments import given_curves
 from .surface_curves import CurvesAndPoints
 from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource, lie_along
-from .vertex_field import VertexField
 
 ROUGHLY = 1e-4
 """Tolerance of distances that are only compared, with differences below a thousandth ignored."""
@@ -48,16 +49,20 @@ FALSE_ZERO_WIDTH = 4.0
 """Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
 
 
-@sharpen_field.register
+@sharpen_on.register(Surface)
+@sharpen_on.register(IntrinsicTriangulation)
 def _(
-    field: VertexField, source: CurvesAndPoints | None, method: Method | None, progress: Progress | None
-) -> VertexField:
+    domain: SurfaceDomain,
+    field: Field[SurfaceDomain],
+    source: CurvesAndPoints | None,
+    method: Method | None,
+    progress: Progress | None,
+) -> Field[SurfaceDomain]:
     if field.finest is not field:
         same = replace(field.finest, diagnostics=field.diagnostics)
-        fine = sharpen_field(same, source, method, progress)
-        assert isinstance(fine, VertexField)
+        fine = sharpen_on(same.domain, same, source, method, progress)
         values = fine.values[: len(field.values)]
-        return replace(field, values=values, diagnostics=fine.diagnostics, finer=cast("VertexField[Any]", fine))
+        return replace(field, values=values, diagnostics=fine.diagnostics, finer=fine)
     surface = discretize(field.domain)
     if not isinstance(surface, SurfaceDiscretization):
         raise UnsupportedTypeError(
@@ -69,7 +74,7 @@ def _(
     return replace(field, values=new[surface.restriction], diagnostics=diagnostics)
 
 
-def at_triangles(surface: SurfaceDiscretization, field: VertexField) -> Floats:
+def at_triangles(surface: SurfaceDiscretization, field: Field[SurfaceDomain]) -> Floats:
     """Values at the vertices of the surface's triangles, by `on_triangulation`, or with NaN where it lacks them."""
     if isinstance(field.domain, IntrinsicTriangulation):
         return field.values  # its vertices are those of the triangles

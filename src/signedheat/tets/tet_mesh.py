@@ -6,20 +6,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Frozen, Ints
 from ..errors import GeometryError
 from ..exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
+from ..fields.field_domain import Exact, FieldDomain
 from ..mesh.components import element_components
 from ..mesh.tet_shapes import FaceTable, Tetrahedra, signed_volumes
 from ..packages import lazy_module
+from ..search.nearest_triangles import TriangleTree
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import coordinates, element_ids, frozen, used_bounds
+from ..validation import coordinates, element_ids, frozen, query_points, shaped, used_bounds
 from ..words import counted
+from .tet_clipping import Planes, barycentric, containing_tets
+from .tet_levels import closed_level_set
 
 if TYPE_CHECKING:
     import meshio
@@ -30,7 +34,7 @@ else:
 
 
 @dataclass(frozen=True, eq=False)
-class TetMesh(Displayed, Frozen):
+class TetMesh(Displayed, Frozen, FieldDomain):
     """Tetrahedra in space.
 
     Parameters
@@ -55,7 +59,7 @@ class TetMesh(Displayed, Frozen):
     See Also
     --------
     tetrahedralize : Fill a shape with tets.
-    TetField : Values on tets.
+    Field : Values on a domain.
 
     Examples
     --------
@@ -238,5 +242,84 @@ class TetMesh(Displayed, Frozen):
     def to_pyvista(self) -> pyvista.UnstructuredGrid:
         return pyvista.UnstructuredGrid({10: np.array(self.tets)}, np.array(self.vertices))
 
+    @property
+    def _values_shape(self) -> tuple[int, ...]:
+        return (self.n_vertices,)
+
+    def _interpolant(self, values: Floats, beyond: Exact | None) -> TetInterpolant:
+        return TetInterpolant(self, values)
+
+    def _level_set(self, values: Floats, level: float, exact: Exact | None) -> TriangleMesh:
+        gradients = self.geometry.mean_gradients(values, self.tets, self.n_vertices)
+        return TriangleMesh(*closed_level_set(self.geometry, values, gradients, level))
+
+    def _values_at_walls(self, values: NDArray[Any]) -> NDArray[Any]:
+        return values[np.unique(self.boundary.faces)]
+
+    @cached_property
+    def _planes(self) -> Planes:
+        return Planes.of(self.geometry)
+
+    @cached_property
+    def _wall_tree(self) -> TriangleTree:
+        return TriangleTree.of(self.vertices[self.boundary.faces])
+
     def __repr__(self) -> str:
         return f"TetMesh({counted(self.n_vertices, 'vertex')}, {counted(self.n_tets, 'tet')})"
+
+
+@dataclass(frozen=True, eq=False)
+class TetInterpolant:
+    """Interpolation to second order, from values and gradients at the corners of tets.
+
+    Outside the mesh it continues linearly from the nearest point of the boundary.
+    """
+
+    mesh: TetMesh
+    values: Floats  # at the vertices, NaN where there are none
+
+    def __call__(self, points: ArrayLike) -> Floats:
+        """Return (...) values at (..., 3) points; NaN where the nearest tet has a vertex without a value."""
+        places, shape = query_points(points, 3)
+        corners, weights, away = self._located(places)
+        steps = (places - away)[:, None] - self.mesh.vertices[corners]
+        tangents = self.values[corners] + np.einsum("pki,pki->pk", self._vertex_gradients[corners], steps) / 2
+        values = np.einsum("pk,pk->p", weights, tangents)
+        outside = np.flatnonzero(away.any(axis=1))
+        if len(outside):
+            slopes = np.einsum("pk,pki->pi", weights[outside], self._vertex_gradients[corners[outside]])
+            values[outside] += np.einsum("pi,pi->p", slopes, away[outside])
+        return shaped(values, shape)
+
+    def gradient(self, points: ArrayLike) -> Floats:
+        """(..., 3) volume-weighted means of gradients at the vertices, interpolated; outside, at the nearest point."""
+        places, shape = query_points(points, 3)
+        corners, weights, _ = self._located(places)
+        return shaped(np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners]), shape)
+
+    @property
+    def cell_gradients(self) -> Floats:
+        """(m, 3) gradient of the linear interpolant in every tet."""
+        return self.mesh.geometry.gradients(self.values[self.mesh.tets])
+
+    @cached_property
+    def _vertex_gradients(self) -> Floats:
+        return self.mesh.geometry.mean_gradients(self.values, self.mesh.tets, self.mesh.n_vertices)
+
+    def _located(self, points: Floats) -> tuple[Ints, Floats, Floats]:
+        """Return (k, 4) vertices and their weights at the closest point of the mesh, and (k, 3) vectors from there."""
+        mesh = self.mesh
+        tets = containing_tets(mesh.geometry, mesh._planes, points)
+        inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)
+        corners = np.zeros((len(points), 4), dtype=np.int64)
+        weights, away = np.zeros((len(points), 4)), np.zeros((len(points), 3))
+        corners[inside] = mesh.tets[tets[inside]]
+        weights[inside] = barycentric(mesh.geometry, tets[inside], points[inside])
+        if len(outside):
+            walls = mesh.boundary
+            faces, coordinates = mesh._wall_tree.nearest(points[outside])
+            corners[outside, :3], weights[outside, :3] = walls.faces[faces], coordinates
+            corners[outside, 3] = corners[outside, 0]
+            nearest = np.einsum("pk,pki->pi", coordinates, walls.vertices[walls.faces[faces]])
+            away[outside] = points[outside] - nearest
+        return corners, weights, away

@@ -20,6 +20,7 @@ from ..compiled import compiled
 from ..diagnostics import Note, RoundCorners, SharpenedToShape
 from ..discretization import SourceTerm
 from ..errors import SourceError
+from ..fields.field import Field
 from ..foreign import SurfaceShape, as_shapes
 from ..geodesics.heap_kernels import Queue, pop, push
 from ..jobs import Progress, run_cancellable
@@ -27,22 +28,25 @@ from ..kinds import Shapes
 from ..mesh.components import grouped
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
-from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_field, sharpened
+from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
 from ..surfaces.point_cloud import PointCloud
+from ..tets.tet_mesh import TetMesh
 from ..transforms import joined_triangles
 from .tet_clipping import SIGHT_OUTSIDE, Planes, barycentric, beyond, stays_inside
 from .tet_discretization import TetDiscretization, lowered_tets
-from .tet_field import TetField, level_triangles
+from .tet_levels import level_triangles
 
 FACE_EDGES = 2.0
 """Distance from a face, in mean edges, within which its side decides the sign, and beyond which from all faces the zero
 set completes the shape."""
 
 
-@sharpen_field.register
-def _(field: TetField, source: Shapes | None, method: Method | None, progress: Progress | None) -> TetField:
-    lowered = lowered_tets(field.mesh)  # nothing is solved on it
-    elements = LinearElements.on_tets(field.mesh.geometry, lowered.unknowns, lowered.n_unknowns)
+@sharpen_on.register
+def _(
+    mesh: TetMesh, field: Field[TetMesh], source: Shapes | None, method: Method | None, progress: Progress | None
+) -> Field[TetMesh]:
+    lowered = lowered_tets(mesh)  # nothing is solved on it
+    elements = LinearElements.on_tets(mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     given = None if source is None else as_shapes(source)
     values = field.values[lowered.vertices]
     new, diagnostics = sharpened(field, lowered, elements, values, given, method, progress)

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..curves.piecewise_field import PiecewiseField
+from ..curves.cut_surface import CutSurface
 from ..errors import GeometryError, MissingPackageError, UnsupportedTypeError
+from ..fields.field import Field
 from ..foreign import converted
 from ..grids.grid import Grid
-from ..grids.grid_field import GridField
 from ..grids.polyline import Polyline
 from ..io.files import PathLike
 from ..kinds import Shape
@@ -24,8 +24,6 @@ from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..surfaces.vertex_field import VertexField, on_simple_surface
-from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
 from .figures import new_figure, picture
 from .slice_pictures import TET_NODES, clearest_layer, draw_line, draw_plane, draw_slices
@@ -109,44 +107,44 @@ def _(line: Polyline, axes: Any, **options: Any) -> bool:
     return True
 
 
-@draw.register
-def _(field: GridField, axes: Any, **options: Any) -> bool:
-    if field.grid.dimension not in (2, 3):
-        return False
-    if field.grid.dimension == 2:
-        draw_plane(field, axes, **options)
-    else:
-        draw_slices(field, [axes], **{"across": (_best_axis(field),), **options})
-    return True
+@draw.register(Field)
+def _(field: Field[Any], axes: Any, **options: Any) -> bool:
+    return draw_on(field.domain, field, axes, **options)
 
 
-@draw.register
-def _(field: TetField, axes: Any, **options: Any) -> bool:
-    grid = Grid.around(np.delete(field.mesh.bounds, 1, axis=1), TET_NODES, padding=0.0)
-    points = np.insert(grid.points.reshape(-1, 2), 1, field.mesh.bounds[:, 1].mean(), axis=1)
-    draw_plane(GridField(grid, field(points).reshape(grid.shape)), axes, **options)
-    axes.set(ylabel="z")
-    return True
-
-
-@draw.register
-def _(field: VertexField, axes: Any, **options: Any) -> bool:
-    simple = on_simple_surface(field)
+@singledispatch
+def draw_on(domain: object, field: Field[Any], axes: Any, **options: Any) -> bool:
+    """Draw a field into axes; every kind of domain registers a function of its own."""
+    simple = field if isinstance(domain, CutSurface) else field.plain()
     if isinstance(simple.domain, PointCloud) and simple.domain.points.shape[1] != 3:
         return False
     draw_surface(simple, axes, **options)
     return True
 
 
-@draw.register
-def _(field: PiecewiseField, axes: Any, **options: Any) -> bool:
-    draw_surface(field, axes, **options)
+@draw_on.register
+def _(grid: Grid, field: Field[Grid], axes: Any, **options: Any) -> bool:
+    if grid.dimension not in (2, 3):
+        return False
+    if grid.dimension == 2:
+        draw_plane(field, axes, **options)
+    else:
+        draw_slices(field, [axes], **{"across": (_best_axis(field),), **options})
     return True
 
 
-def _best_axis(field: GridField) -> int:
+@draw_on.register
+def _(mesh: TetMesh, field: Field[TetMesh], axes: Any, **options: Any) -> bool:
+    grid = Grid.around(np.delete(mesh.bounds, 1, axis=1), TET_NODES, padding=0.0)
+    points = np.insert(grid.points.reshape(-1, 2), 1, mesh.bounds[:, 1].mean(), axis=1)
+    draw_plane(Field(grid, field(points).reshape(grid.shape)), axes, **options)
+    axes.set(ylabel="z")
+    return True
+
+
+def _best_axis(field: Field[Grid]) -> int:
     """Choose the axis across which a slice shows most of the inside; y, then z, if equal."""
-    field = field.whole
+    field = field.coarse or field
     inside = field.values < 0
     counts = [int(inside.take(clearest_layer(field, axis), axis).sum()) for axis in range(3)]
     return max((1, 2, 0), key=lambda axis: counts[axis])

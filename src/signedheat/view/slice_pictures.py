@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats
 from ..errors import GeometryError
+from ..fields.field import Field
 from ..grids.grid import Grid
-from ..grids.grid_field import GridField
 from ..grids.marching import level_lines
 from ..grids.polyline import Polyline
 from ..io.files import PathLike
@@ -21,7 +21,7 @@ from ..kinds import SpaceSources
 from ..packages import lazy_module
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..tets.tet_field import TetField
+from ..tets.tet_mesh import TetMesh
 from .figures import add_color_bar, distance_colors, isolines_between, picture, range_of
 from .surface_pictures import outside_of, triangulated
 
@@ -37,7 +37,7 @@ TET_NODES = 80
 
 
 def save_slices(
-    field: GridField | TetField, path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
+    field: Field[Grid] | Field[TetMesh], path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
 ) -> None:
     """Write a picture of three orthogonal slices through a field, each through most of the inside, with the shape.
 
@@ -46,7 +46,8 @@ def save_slices(
 
     Parameters
     ----------
-    field : GridField or TetField
+    field : Field
+        On a grid or tets.
         A field in two or three dimensions.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
@@ -62,15 +63,15 @@ def save_slices(
     GeometryError
         If the field has one dimension, or more than three, or no value anywhere.
     """
-    if isinstance(field, TetField):
-        grid = Grid.around(field.mesh.bounds, resolution=TET_NODES, padding=0.0)
-        field = GridField(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))
-    if field.grid.dimension not in (2, 3):
+    if isinstance(field.domain, TetMesh):
+        grid = Grid.around(field.domain.bounds, resolution=TET_NODES, padding=0.0)
+        field = Field(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))
+    if field.domain.dimension not in (2, 3):
         raise GeometryError(
-            f"fields are drawn in 2 and 3 dimensions, and this one has {field.grid.dimension}", element="field"
+            f"fields are drawn in 2 and 3 dimensions, and this one has {field.domain.dimension}", element="field"
         )
-    if field.grid.dimension == 2:
-        sides = field.grid.upper - field.grid.origin
+    if field.domain.dimension == 2:
+        sides = field.domain.upper - field.domain.origin
         with picture(path, *(7.5 * sides / sides.max() + [1.6, 0.6])) as figure:
             draw_plane(field, figure.add_subplot(), shape, levels)
     else:
@@ -79,34 +80,34 @@ def save_slices(
 
 
 def draw_slices(
-    field: GridField,
+    field: Field[Grid],
     axes: Sequence[Axes],
     shape: SpaceSources | None = None,
     levels: Sequence[float] = (),
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
     """Draw a slice into each of some axes of a figure; `across` lists their constant coordinates."""
-    field = field.whole
+    field = field.coarse or field
     colors, isolines, step = _look(field)
     for panel, normal in zip(axes, across, strict=True):
         horizontal, vertical = (axis for axis in range(3) if axis != normal)
         layer = clearest_layer(field, normal)
-        position = float(field.grid.axes[normal][layer])
-        u, v = field.grid.axes[horizontal], field.grid.axes[vertical]
+        position = float(field.domain.axes[normal][layer])
+        u, v = field.domain.axes[horizontal], field.domain.axes[vertical]
         index = (slice(None),) * normal + (layer,)
         trusted = None if field.confidence is None else field.confidence[index]
         _draw_panel(panel, u, v, field.values[index], colors, isolines, levels, trusted)
-        _draw_section(panel, shape, normal, position, float(field.grid.spacing[normal]))
+        _draw_section(panel, shape, normal, position, float(field.domain.spacing[normal]))
         panel.set(xlabel=AXIS_NAMES[horizontal], ylabel=AXIS_NAMES[vertical])
-        panel.set_title(f"{AXIS_NAMES[normal]} = {rounded(position, field.grid.spacing[normal])}", fontsize=10)
+        panel.set_title(f"{AXIS_NAMES[normal]} = {rounded(position, field.domain.spacing[normal])}", fontsize=10)
     add_color_bar(axes[0].figure, axes, colors, isolines, step)
 
 
-def clearest_layer(field: GridField, axis: int) -> int:
+def clearest_layer(field: Field[Grid], axis: int) -> int:
     """Choose the layer across an axis with most nodes inside, or else near zero; of similar ones the most central."""
     inside = field.values < 0
     if not inside.any():
-        inside = np.abs(field.values) < 1.5 * field.grid.spacing.max()
+        inside = np.abs(field.values) < 1.5 * field.domain.spacing.max()
     others = tuple(other for other in range(3) if other != axis)
     counts = inside.sum(axis=others)
     most = np.flatnonzero(counts >= 0.98 * counts.max())
@@ -119,10 +120,10 @@ def rounded(position: float, spacing: float) -> str:
     return f"{round(position, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else f"{position:.0f}"
 
 
-def draw_plane(field: GridField, axes: Axes, shape: SpaceSources | None = None, levels: Sequence[float] = ()) -> None:
+def draw_plane(field: Field[Grid], axes: Axes, shape: SpaceSources | None = None, levels: Sequence[float] = ()) -> None:
     """Draw a field in the plane into axes, with polylines or points in red."""
     colors, isolines, step = _look(field)
-    u, v = field.grid.axes
+    u, v = field.domain.axes
     _draw_panel(axes, u, v, field.values, colors, isolines, levels)
     for line in shape if isinstance(shape, Sequence) else [shape]:
         if isinstance(line, PointCloud):
@@ -139,7 +140,7 @@ def draw_line(line: Polyline, axes: Axes) -> None:
     axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
 
 
-def _look(field: GridField) -> tuple[ScalarMappable, Floats, float]:
+def _look(field: Field[Grid]) -> tuple[ScalarMappable, Floats, float]:
     """Choose colours, isolines and the step between them, shared by all panels of a picture."""
     low, high = range_of(field.values)
     return distance_colors(low, high), *isolines_between(low, high)

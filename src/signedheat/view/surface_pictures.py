@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..curves.piecewise_field import PiecewiseField
+from ..curves.cut_surface import CutSurface
 from ..exchange import Elements
+from ..fields.field import Field
 from ..foreign import ForeignShape, as_shape, elements
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.numpy_files import write_npz
@@ -31,7 +32,6 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import Curve, CurveOrPoints
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..surfaces.vertex_field import VertexField
 from ..tets.tet_mesh import TetMesh
 from .figures import (
     INSIDE_TO_OUTSIDE,
@@ -232,7 +232,7 @@ def triangulated(mesh: TriangleMesh | PolygonMesh) -> TriangleMesh:
 
 
 def save_surface(
-    field: VertexField | PiecewiseField,
+    field: Field[Any],
     path: PathLike,
     sources: CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
@@ -244,7 +244,7 @@ def save_surface(
 
     Parameters
     ----------
-    field : VertexField or PiecewiseField
+    field : Field
         Distance on a surface.
     path : str or path
         The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
@@ -270,7 +270,7 @@ def save_surface(
 
 
 def draw_surface(
-    field: VertexField | PiecewiseField,
+    field: Field[Any],
     axes: Axes,
     sources: CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
@@ -308,13 +308,14 @@ def draw_surface(
         add_color_bar(axes.figure, [axes], scale, spanned, step)
 
 
-def _own_and_painted(field: VertexField | PiecewiseField) -> tuple[TriangleMesh, Any, Floats]:
+def _own_and_painted(field: Field[Any]) -> tuple[TriangleMesh, Any, Floats]:
     """Return the triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
     domain = field.domain
-    own = domain.mesh if isinstance(domain, IntrinsicTriangulation) else domain.triangulation
-    painted = field.split() if isinstance(field, PiecewiseField) else field.subdivided()
-    surface: Any = painted.domain
-    return own, surface.triangulation, surface.on_triangulation(painted.values)
+    surface = domain.surface if isinstance(domain, CutSurface) else domain
+    own = surface.mesh if isinstance(surface, IntrinsicTriangulation) else surface.triangulation
+    painted = field.expand()
+    drawn: Any = painted.domain
+    return own, drawn.triangulation, drawn.on_triangulation(painted.values)
 
 
 def darken(image: Floats, phi: Floats, covered: Bools, step: float) -> None:
@@ -449,7 +450,7 @@ def _draw_deviation(found: Deviation, path: PathLike) -> None:
         if isinstance(found.scan, PointCloud):
             draw_points(found.points, scan, oblique(*VIEW_ANGLES), colors=scale.to_rgba(found.distances))
         else:
-            draw_surface(VertexField(found.scan, found.distances), scan, colors=scale)
+            draw_surface(Field(found.scan, found.distances), scan, colors=scale)
         figure.colorbar(scale, ax=scan, shrink=0.85, pad=0.015, extend="both", format="{x:g}")
         counts, limits = found.histogram()
         middles = 0.5 * (limits[1:] + limits[:-1])

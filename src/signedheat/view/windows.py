@@ -6,15 +6,12 @@ from contextlib import suppress
 from functools import singledispatch
 from typing import Any
 
-from ..curves.piecewise_field import PiecewiseField
 from ..errors import GeometryError, OutsideError
 from ..exchange import VALUES_NAME
+from ..fields.field import Field
 from ..grids.grid import Grid
-from ..grids.grid_field import GridField
 from ..grids.polyline import Polyline
 from ..packages import lazy_module
-from ..surfaces.vertex_field import VertexField
-from ..tets.tet_field import TetField
 from ..tets.tet_mesh import TetMesh
 from .figures import even_colors, isolines_between, range_of
 from .surface_pictures import INNER_COLOR, OUTER_COLOR
@@ -62,34 +59,22 @@ def _(grid: Grid, plotter: Any) -> None:
     plotter.add_mesh(grid.to_pyvista().outline(), color=LINE)
 
 
-@add.register
-def _(field: GridField, plotter: Any) -> None:
-    field = field.whole
-    image, look = field.to_pyvista(), _look(field.values)
-    if field.grid.dimension == 2:
-        _add_colors(plotter, image, look)
-        _add_isolines(plotter, image, look)
+@add.register(Field)
+def _(field: Field[Any], plotter: Any) -> None:
+    in_space = isinstance(field.domain, Grid | TetMesh)
+    field = (field.coarse or field) if in_space else field.expand()
+    drawn, look = field.to_pyvista(), _look(field.values)
+    if not in_space:
+        _add_colors(plotter, drawn, look, point_size=6, render_points_as_spheres=True)
+        if drawn.faces.size:
+            _add_isolines(plotter, drawn, look)
+    elif isinstance(field.domain, Grid) and field.domain.dimension == 2:
+        _add_colors(plotter, drawn, look)
+        _add_isolines(plotter, drawn, look)
         plotter.view_xy()
-        return
-    _add_section(plotter, image, look)
-    _add_zero_set(plotter, field)
-
-
-@add.register
-def _(field: TetField, plotter: Any) -> None:
-    _add_section(plotter, field.to_pyvista(), _look(field.values))
-    _add_zero_set(plotter, field)
-
-
-@add.register(VertexField)
-@add.register(PiecewiseField)
-def _(field: VertexField | PiecewiseField, plotter: Any) -> None:
-    if isinstance(field, VertexField):
-        field = field.subdivided()
-    surface, look = field.to_pyvista(), _look(field.values)
-    _add_colors(plotter, surface, look, point_size=6, render_points_as_spheres=True)
-    if surface.faces.size:
-        _add_isolines(plotter, surface, look)
+    else:
+        _add_section(plotter, drawn, look)
+        _add_zero_set(plotter, field)
 
 
 def _look(values: Any) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -67,6 +67,17 @@ class SolidQueries(Protocol):
     def distance(self, points: ArrayLike) -> Floats: ...  # (...) signed distances of (..., d) points
     def inside(self, points: ArrayLike) -> Bools: ...  # (...) whether points are inside
     def closest(self, points: ArrayLike) -> Closest: ...  # the nearest place for each of (..., d) points
+
+
+@runtime_checkable
+class MakesFields(Protocol):
+    """An object whose distance can be computed where a field has values, such as a `Solid`."""
+
+    def field_on(self, field: Any) -> Any:
+        """Compute distance on the domain of a field."""
+
+    def _surface_on(self, field: Any, level: float) -> Any:
+        """Extract the surface at a level of its field, with edges and corners, in the cells of the field's grid."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,52 +4,49 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import singledispatch
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from scipy import sparse
 
-from .arrays import Bools, Floats, mask_of
-from .diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
-from .errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
-from .geodesics.exact_distance import shortest_arcs
-from .grids.grid_discretization import GridDiscretization, GridSource
-from .grids.grid_field import GridField
-from .mesh.components import connected_components
-from .parallel import PointTree
-from .surfaces.plane_fits import POINT_NEIGHBORS
-from .surfaces.point_cloud import PointCloud
-from .surfaces.surface_discretization import SurfaceDiscretization
-from .surfaces.surface_source import SurfaceSource, joined
-from .surfaces.vertex_field import VertexField
-from .tets.tet_discretization import TetDiscretization
-from .tets.tet_field import TetField
-from .tets.tet_source import TetSource
+from ..arrays import Bools, Floats, mask_of
+from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
+from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..fields.field import Domain, Field
+from ..geodesics.exact_distance import shortest_arcs
+from ..grids.grid import Grid
+from ..grids.grid_discretization import GridDiscretization, GridSource
+from ..kinds import SurfaceDomain
+from ..mesh.components import connected_components
+from ..parallel import PointTree
+from ..surfaces.plane_fits import POINT_NEIGHBORS
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.surface_discretization import SurfaceDiscretization
+from ..surfaces.surface_source import SurfaceSource, joined
+from ..tets.tet_discretization import TetDiscretization
+from ..tets.tet_mesh import TetMesh
+from ..tets.tet_source import TetSource
 
-Field = GridField | VertexField | TetField
-"""What a solver returns."""
-
-AnyField = TypeVar("AnyField", GridField, VertexField, TetField, Field)
 SMALL_LOOP = 3.5
 """Length of a loop, in side lengths of the triangles that it crosses, below which at least a quarter of its heat
 cancels."""
 
 
 @singledispatch
-def to_field(discretization: Any, values: Floats, source: Any, diagnostics: Diagnostics) -> Field:
+def to_field(discretization: Any, values: Floats, source: Any, diagnostics: Diagnostics) -> Field[Any]:
     """Make a field of the values at a discretisation's unknowns, and add the discretisation's notes to diagnostics."""
     raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
 
 
 @to_field.register
-def _(discretization: GridDiscretization, values: Floats, source: GridSource, diagnostics: Diagnostics) -> GridField:
-    return GridField(discretization.grid, values, diagnostics.noting(sampled(source)))
+def _(discretization: GridDiscretization, values: Floats, source: GridSource, diagnostics: Diagnostics) -> Field[Grid]:
+    return Field(discretization.grid, values, diagnostics.noting(sampled(source)))
 
 
 @to_field.register
 def _(
     discretization: SurfaceDiscretization, values: Floats, source: SurfaceSource, diagnostics: Diagnostics
-) -> VertexField:
+) -> Field[SurfaceDomain]:
     # NaN where diffusion did not reach, such as behind a single shared vertex
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
     triangulation, everywhere = discretization.triangulation, values
@@ -72,8 +69,8 @@ def _(
     finer = None
     if triangulation is not None:
         added = everywhere[len(values) : triangulation.n_vertices]
-        finer = VertexField(triangulation, np.concatenate([values, added]), noted, source)
-    return VertexField(discretization.domain, values, noted, source, finer)
+        finer = Field(triangulation, np.concatenate([values, added]), noted, source=source)
+    return Field(discretization.domain, values, noted, source=source, finer=finer)
 
 
 def _named(domain: object, vertex: int) -> str:
@@ -83,7 +80,7 @@ def _named(domain: object, vertex: int) -> str:
 
 
 @to_field.register
-def _(discretization: TetDiscretization, values: Floats, source: TetSource, diagnostics: Diagnostics) -> TetField:
+def _(discretization: TetDiscretization, values: Floats, source: TetSource, diagnostics: Diagnostics) -> Field[TetMesh]:
     mesh, at_vertices = discretization.mesh, discretization.at_vertices(values)
     unreached = np.flatnonzero(np.isnan(at_vertices))
     if np.isnan(values).any():
@@ -94,7 +91,7 @@ def _(discretization: TetDiscretization, values: Floats, source: TetSource, diag
         )
     turned = (TetsTurned(len(mesh.reoriented)),) if len(mesh.reoriented) else ()
     noted = replace(diagnostics, unreached=unreached).noting(*source.notes, *turned)
-    return TetField(mesh, at_vertices, noted, source)
+    return Field(mesh, at_vertices, noted, source=source)
 
 
 def sampled(source: GridSource) -> SampledSource:
@@ -102,7 +99,7 @@ def sampled(source: GridSource) -> SampledSource:
     return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
 
 
-def warned(field: AnyField) -> AnyField:
+def warned(field: Field[Domain]) -> Field[Domain]:
     """Return the field, and warn if it was computed from curves that are too small for its triangles."""
     note = field.diagnostics.note(SmallLoops)
     if note:

@@ -1,4 +1,4 @@
-"""Levels of a field: refuse those that leave its domain, and move points onto exact ones."""
+"""Level sets of exact distance: points on edges of a grid are moved onto the level."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import Protocol
 
 import numpy as np
 
-from .arrays import Floats, Ints
-from .errors import OutsideError
-from .grids.grid import Grid
-from .mesh.edges import CLEARANCE
+from ..arrays import Floats, Ints
+from ..mesh.edges import CLEARANCE
 
 ON_LEVEL = 1e-3
 """Distance from a level, in cells, up to which a point counts as lying on it."""
@@ -26,30 +24,29 @@ class NodeValues(Protocol):
     def __getitem__(self, nodes: tuple[Ints, ...], /) -> Floats: ...
 
 
-def refuse_beyond_walls(walls: Floats, distance: float, domain: str, remedy: str) -> None:
-    """Raise `OutsideError` if the values at a domain's walls show that a level leaves it, but the shape does not."""
-    low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
-    if (low > 0 or high < 0) and low < distance < high:
-        raise OutsideError(
-            f"the surface at distance {distance:g} leaves the {domain}, which holds distances up to "
-            f"{low if low > 0 else high:g}",
-            remedy=remedy,
-        )
-
-
 def on_level(
-    distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
+    distance: Callable[[Floats], Floats],
+    points: Floats,
+    values: NodeValues,
+    origin: Floats,
+    spacing: Floats,
+    level: float,
 ) -> Floats:
     """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space."""
     places = np.empty(points.shape)
     for begin in range(0, len(points), POINTS_AT_ONCE):
         batch = slice(begin, begin + POINTS_AT_ONCE)
-        places[batch] = _moved(distance, points[batch], values, grid, level)
+        places[batch] = _moved(distance, points[batch], values, origin, spacing, level)
     return places
 
 
 def _moved(
-    distance: Callable[[Floats], Floats], points: Floats, values: NodeValues, grid: Grid, level: float
+    distance: Callable[[Floats], Floats],
+    points: Floats,
+    values: NodeValues,
+    origin: Floats,
+    spacing: Floats,
+    level: float,
 ) -> Floats:
     """Do the work of `on_level` by regula falsi (Dowell & Jarratt 1971)."""
     base = np.floor(points).astype(np.int64)
@@ -62,8 +59,8 @@ def _moved(
     low, high = (values[tuple(at[movable].T)] - level for at in (base, upper))
     crossed = (low < 0) != (high < 0)
     movable, low, high = movable[crossed], low[crossed], high[crossed]
-    moved = grid.origin + points * grid.spacing
-    base, axis, far = base[movable], axis[movable], ON_LEVEL * float(grid.spacing.min())
+    moved = origin + points * spacing
+    base, axis, far = base[movable], axis[movable], ON_LEVEL * float(spacing.min())
     start, stop, last = np.zeros(len(base)), np.ones(len(base)), np.zeros(len(base), dtype=np.int8)
     active = np.arange(len(base))
     for _ in range(10):  # few points need more than 4
@@ -73,7 +70,7 @@ def _moved(
         share = np.clip(start[active] + share * (stop[active] - start[active]), CLEARANCE, 1 - CLEARANCE)
         at = base[active].astype(np.float64)
         at[np.arange(len(active)), axis[active]] += share
-        places = grid.origin + at * grid.spacing
+        places = origin + at * spacing
         off = distance(places) - level
         moved[movable[active]] = places
         same = (off < 0) == (low[active] < 0)

@@ -1,0 +1,299 @@
+"""Surfaces cut along lines, across which a field that is linear in every triangle may jump."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of
+from ..errors import GeometryError
+from ..fields.field_domain import Exact
+from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs, split_corners
+from ..mesh.polylines import assemble_polylines
+from ..mesh.surface_points import barycentric_in, locate_points
+from ..mesh.triangles import gradients_along
+from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.subdivision import positions, subdivided
+from ..surfaces.surface import LinearDomain, placed
+from ..surfaces.surface_curves import Curve
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import shaped
+from ..words import counted
+
+
+@dataclass(frozen=True, eq=False)
+class Cut(Frozen):
+    """A polyline along edges of the surface across which a field is discontinuous.
+
+    Attributes
+    ----------
+    vertices : (k,) int
+        Vertices of `CutSurface.triangulation`, in order; the first is repeated at the end if the line is closed.
+    points : (k, 3) float
+        Their positions.
+    jumps : (k - 1, 2) float
+        Absolute difference of the field between the two sides of each edge, at the two ends of the edge.
+    steps : (k - 1,) float
+        Length of each edge, along the surface.
+
+    See Also
+    --------
+    results.CutSurface : The surface, and its cuts.
+    """
+
+    vertices: Ints
+    points: Floats
+    jumps: Floats
+    steps: Floats
+
+    @property
+    def length(self) -> float:
+        """Length of the cut."""
+        return float(self.steps.sum())
+
+    @property
+    def height(self) -> float:
+        """Mean jump along the cut."""
+        return float(np.average(self.jumps.mean(axis=1), weights=self.steps))
+
+    def __repr__(self) -> str:
+        return f"Cut({counted(len(self.vertices), 'vertex')}, length {self.length:.4g}, mean jump {self.height:.4g})"
+
+
+@dataclass(frozen=True, eq=False)
+class CutSurface(LinearDomain, Frozen):
+    """A surface cut along edges: the domain of the fields of `piecewise_distance`, which may jump there.
+
+    Values are (m, 3), at the corners of the triangles, NaN where no source is connected.
+
+    Attributes
+    ----------
+    surface : TriangleMesh, PolygonMesh or IntrinsicTriangulation
+        The whole surface.
+    triangles : IntrinsicMesh
+        Its triangles, or those of the virtual refinement of its polygons, as an intrinsic mesh.
+    is_cut : (p,) bool
+        Those of the `pairs` of triangles that the cut separates.
+
+    See Also
+    --------
+    piecewise_distance : Distance to curves that bound no region.
+    Field : Values on a domain.
+
+    Examples
+    --------
+    A step across the diagonal of a square:
+
+    >>> from signedheat.fields.field import Field
+    >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    >>> square = CutSurface(mesh, mesh.intrinsic, np.array([True]))
+    >>> phi = Field(square, [[1.0] * 3, [0.0] * 3])
+    >>> phi.domain.cuts(phi.values)
+    [Cut(2 vertices, length 1.414, mean jump 1)]
+    """
+
+    surface: TriangleMesh | PolygonMesh | IntrinsicTriangulation
+    triangles: IntrinsicMesh
+    is_cut: Bools
+
+    @property
+    def triangulation(self) -> TriangleMesh | IntrinsicTriangulation:
+        """The triangles at whose corners fields have values."""
+        return self.surface if isinstance(self.surface, IntrinsicTriangulation) else self.surface.triangulation
+
+    @property
+    def n_vertices(self) -> int:
+        """Number of vertices of the triangles, each counted once."""
+        return self.triangulation.n_vertices
+
+    @cached_property
+    def pairs(self) -> FacePairs:
+        """The pairs of triangles that share an edge."""
+        return face_pairs(self.triangles)
+
+    def jumps(self, values: Floats) -> Floats:
+        """Compute the jump of a field across each edge.
+
+        Parameters
+        ----------
+        values : (m, 3) float
+            Those of the field.
+
+        Returns
+        -------
+        (p, 2) float
+            Jump at the two ends of the edge between the faces of each of the `pairs`.
+
+        Examples
+        --------
+        >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> np.abs(CutSurface(mesh, mesh.intrinsic, np.array([True])).jumps(np.array([[1.0] * 3, [0.0] * 3]))).tolist()
+        [[1.0, 1.0]]
+        """
+        return self.pairs.ends(values)
+
+    def cuts(self, values: Floats) -> list[Cut]:
+        """Return the lines across which a field is discontinuous, longest first.
+
+        Parameters
+        ----------
+        values : (m, 3) float
+            Those of the field.
+
+        Returns
+        -------
+        list of Cut
+            Empty if the surface is not cut.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> torus = sh.samples.torus(24, 12)
+        >>> phi = sh.piecewise_distance(torus.path(range(24), closed=True), torus)
+        >>> len(phi.domain.cuts(phi.values))
+        1
+        """
+        pairs = np.flatnonzero(self.is_cut)
+        height = np.abs(self.jumps(values)[pairs])
+        edges, first, numbers = np.unique(self.pairs.edges[pairs], return_index=True, return_inverse=True)
+        largest = np.zeros((len(first), 2))
+        np.maximum.at(largest, numbers, height)
+        lengths = self.triangles.lengths_of_edges
+        ids, lines = self.triangles.edges.vertices[edges], []
+        for chain, backwards, _ in assemble_polylines(ids[:, 0], ids[:, 1], directed=False):
+            ends, jumps = (
+                np.where(backwards[:, None], pairs[chain][:, ::-1], pairs[chain]) for pairs in (ids, largest)
+            )
+            vertices = np.concatenate([ends[:, 0], ends[-1:, 1]])
+            lines.append(Cut(vertices, self.triangulation.vertices[vertices], jumps, lengths[edges[chain]]))
+        return sorted(lines, key=lambda line: -line.length)
+
+    @cached_property
+    def split_vertices(self) -> tuple[Ints, Ints]:
+        """(3m,) vertex of the surface cut open at each corner, and the original vertex of each of those."""
+        owner = split_corners(self.triangles, self.pairs, self.is_cut)
+        _, first = np.unique(owner, return_index=True)
+        return owner, self.triangulation.faces.ravel()[first]
+
+    def means(self, values: Floats) -> Floats:
+        """Average the values of a field over the corners at each vertex of the surface cut open.
+
+        Parameters
+        ----------
+        values : (m, 3) float
+            Those of the field.
+
+        Returns
+        -------
+        (n,) float
+            One for each vertex of `split_vertices`.
+
+        Examples
+        --------
+        >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> CutSurface(mesh, mesh.intrinsic, np.array([True])).means(np.array([[1.0] * 3, [0.0] * 3])).tolist()
+        [1.0, 1.0, 1.0, 0.0, 0.0, 0.0]
+        """
+        owner, _ = self.split_vertices
+        return np.bincount(owner, values.ravel()) / np.bincount(owner)
+
+    @property
+    def _values_shape(self) -> tuple[int, ...]:
+        return (self.triangles.n_faces, 3)
+
+    def _interpolant(self, values: Floats, beyond: Exact | None) -> CutInterpolant:
+        return CutInterpolant(self, values)
+
+    def _level_set(self, values: Floats, level: float, exact: Exact | None) -> list[Curve]:
+        mesh, at_vertices = self._plain(values)
+        return mesh._level_set(at_vertices, level, exact)
+
+    def _expanded(self, values: Floats, beyond: Exact | None) -> tuple[TriangleMesh | PolygonMesh, Floats]:
+        return self._plain(values)
+
+    def _plain(self, values: Floats) -> tuple[TriangleMesh | PolygonMesh, Floats]:
+        """Return the field on a mesh whose vertices are doubled along the cut; elsewhere they have the means."""
+        if isinstance(self.surface, IntrinsicTriangulation):
+            return self._in_space(self.surface, values)
+        owner, vertices = self.split_vertices
+        mesh = TriangleMesh(self.triangulation.vertices[vertices], owner.reshape(-1, 3))
+        return mesh, self.means(values)
+
+    def _in_space(self, surface: IntrinsicTriangulation, phi: Floats) -> tuple[PolygonMesh, Floats]:
+        """Move a field to the common subdivision of mesh and triangulation, with vertices doubled along the cut."""
+        triangles, n = self.triangles, surface.n_vertices
+        polygons, owners, where = subdivided(surface)
+        sizes = [len(polygon) for polygon in polygons]
+        node, face = np.concatenate(polygons), np.repeat(owners, sizes)
+        at_vertices, on = np.flatnonzero(node < n), np.flatnonzero(node >= n)  # corners at vertices; where edges cross
+
+        # values at all corners, and keys: corners with the same key become one vertex
+        owner = self.split_vertices[0]
+        at_corners = self.means(phi)[owner].reshape(-1, 3)
+        corner = 3 * face[at_vertices] + (
+            triangles.corner_vertices[face[at_vertices]] == node[at_vertices, None]
+        ).argmax(axis=1)
+        places = where[node[on] - n]
+        on_cut = mask_of(triangles.n_edges, self.pairs.edges[self.is_cut])
+        values, keys = np.empty(len(node)), np.zeros((len(node), 2), dtype=np.int64)
+        values[at_vertices], keys[at_vertices, 1] = at_corners.ravel()[corner], owner[corner]
+        values[on] = (at_corners[face[on]] * barycentric_in(triangles, face[on], places)).sum(axis=1)
+        keys[on, 0], keys[on, 1] = 1 + node[on], np.where(on_cut[places.elements], face[on], -1)
+
+        # a vertex for each key, and the polygons between these
+        _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        space = np.concatenate([surface.vertices, positions(surface, where)])
+        ends = np.cumsum([0, *sizes])
+        mesh = PolygonMesh(space[node[first]], [vertex[a:b] for a, b in pairwise(ends)])
+        return mesh, values[first]
+
+    def __repr__(self) -> str:
+        lines = len(self.cuts(np.zeros((self.triangles.n_faces, 3))))
+        return f"CutSurface({self.surface!r}, {counted(lines, 'cut')})"
+
+
+@dataclass(frozen=True, eq=False)
+class CutInterpolant:
+    """Linear interpolation in each triangle; on edges, in the triangle through which a point is given."""
+
+    domain: CutSurface
+    values: Floats  # (m, 3) at the corners of the triangles
+
+    def __call__(self, points: Any) -> Floats:
+        """Return (...) values at points that `placed` takes."""
+        faces, weights, shape = placed(self._mesh, points)
+        if isinstance(self.domain.surface, IntrinsicTriangulation):
+            faces, weights = self.domain.surface.locate(faces, weights)
+            return shaped((self.values[faces] * weights).sum(axis=1), shape)
+        places = locate_points(self.domain.triangles, faces, weights)
+        return shaped((self.values[places.faces] * places.barycentric).sum(axis=1), shape)
+
+    def gradient(self, points: Any) -> Floats:
+        """(..., 3) gradients in space."""
+        faces, weights, shape = placed(self._mesh, points)
+        if isinstance(self.domain.surface, IntrinsicTriangulation):
+            return shaped(self.domain.surface.gradient(self.values, faces, weights), shape)
+        places = locate_points(self.domain.triangles, faces, weights)
+        return shaped(self.cell_gradients[places.faces], shape)
+
+    @property
+    def _mesh(self) -> TriangleMesh:
+        surface = self.domain.surface
+        return surface.mesh if isinstance(surface, IntrinsicTriangulation) else surface.triangulation
+
+    @cached_property
+    def cell_gradients(self) -> Floats:
+        """(m, 3) gradients in the triangles, in space."""
+        surface = self.domain.triangulation
+        if isinstance(surface, IntrinsicTriangulation):
+            raise GeometryError(
+                "the triangles of an intrinsic triangulation are not flat in space, so φ has no one gradient in each",
+                remedy="use gradient(points), or expand().cell_gradients",
+            )
+        corners = surface.vertices[surface.faces]
+        return gradients_along(corners[:, 1:] - corners[:, :1], self.values[:, 1:] - self.values[:, :1])

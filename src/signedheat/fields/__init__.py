@@ -1,0 +1,1 @@
+"""Fields: values on any domain, what they are distances to, and their arithmetic."""

@@ -1,0 +1,794 @@
+"""Fields: values on a domain, what is between them, their level sets and their arithmetic."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike
+from typing import TYPE_CHECKING, Any, Generic, Literal, TypeAlias, cast, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, DTypeLike, NDArray
+
+from ..arrays import Bools, Floats, Frozen
+from ..calls import public_call
+from ..diagnostics import Diagnostics
+from ..discretization import SourceTerm
+from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
+from ..exchange import Displayed, with_values
+from ..grids.band import Band
+from ..grids.grid import Grid
+from ..grids.polyline import Polyline
+from ..kinds import EmbeddedSurface
+from ..packages import lazy_module
+from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
+from ..surfaces.subdivision import common_subdivision
+from ..surfaces.surface import LinearDomain
+from ..surfaces.surface_curves import Curve, SurfacePoints
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
+from ..validation import array_of, finite_number, instance
+from .field_domain import FieldDomain, Interpolant
+from .solid_queries import Closest, MakesFields, SolidQueries, scaled
+
+files: Any = lazy_module("signedheat.io.field_files", "files")
+ply: Any = lazy_module("signedheat.io.ply", "files")
+
+if TYPE_CHECKING:
+    import pyvista
+    from typing_extensions import TypeVar
+
+    Domain = TypeVar("Domain", bound=FieldDomain, default=FieldDomain, covariant=True)
+else:
+    from typing import TypeVar
+
+    Domain = TypeVar("Domain", bound=FieldDomain, covariant=True)
+
+Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
+Rule: TypeAlias = Callable[[Floats, Floats], Floats]
+Number: TypeAlias = float | np.number[Any]
+NUMBER_TYPES = (int, float, np.number)
+
+
+def finite(number: Number) -> float:
+    """Return a number as a float; refuse NaN and infinity, which would leave no distance."""
+    return finite_number(number, "number")
+
+
+@dataclass(frozen=True, eq=False)
+class Field(Displayed, Frozen, Generic[Domain]):
+    """Signed distance, or any other function, by its values on a domain.
+
+    ``field(points)`` evaluates it anywhere, `contour` extracts level sets, and `save` writes it. ``-field``,
+    ``2 * field`` and ``field + 1`` are fields; so ``field - 0.1`` is the offset by 0.1. NumPy's functions treat a field
+    as the array of its values. ``a | b``, ``a & b``, ``a - b`` and ``~a`` combine solids that fields are negative in.
+
+    A field that holds its solid is exact anywhere. It stays so when it is negated, multiplied, saved as ``.npz``, or
+    combined with another that holds its own; sums with numbers are interpolated. Combinations of fields without solids
+    have the right sign and zero set, but on one side of the boundary they are a bound of the distance; `sharpen` makes
+    them distance.
+
+    Parameters
+    ----------
+    domain : Grid, Band, TetMesh, TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, IntrinsicTriangulation
+        Where the values are. `piecewise_distance` returns fields on a `results.CutSurface`.
+    values : array
+        φ, in the units of the domain: ``values[i, j, k]`` at ``grid.points[i, j, k]`` of a grid; (n_vertices,) on tets
+        and surfaces; (n, 8, 8, 8) in the blocks of a band. Positive on the side that the normals of the source point
+        to, so negative inside a shape with outward normals. NaN where no source is connected.
+    diagnostics : Diagnostics
+        Timings, diffusion time, and notes on the computation.
+    confidence : array, optional
+        From 0 to 1, in the shape of the values: 1 where the nearest surface is given, less where it had to be
+        completed, the farther from any face.
+    solid : Solid, optional
+        What the values are distances to; calls, gradients and contours are then exact.
+    source : SourceTerm, optional
+        What a solver computed the field from, for `sharpen`.
+    coarse : Field, optional
+        φ on the whole box, for points beyond a band; every field in a band has one.
+    finer : Field, optional
+        φ on an intrinsic triangulation of a mesh, where it was computed: values at points and contours use it.
+
+    Raises
+    ------
+    GeometryError
+        If the values do not have the shape that the domain needs.
+    UnsupportedTypeError
+        If fields have no values on such a domain.
+
+    See Also
+    --------
+    signed_distance : Distance on a grid, on tets or along a surface.
+    read_field : Read a field.
+    sharpen : Distance to the zero set of a field.
+
+    Examples
+    --------
+    >>> import signedheat as sh
+    >>> grid = sh.Grid(origin=(-1, -1, -1), spacing=0.1, shape=(21, 21, 21))
+    >>> phi = Field(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+    >>> phi([[0.7, 0.0, 0.0]]).round(3)
+    array([0.2])
+    >>> phi.contour(0.1).n_faces > 0, float(np.max(-phi))
+    (True, 0.5)
+    >>> left, right = (Field(grid, np.linalg.norm(grid.points - [x, 0, 0], axis=-1) - 0.5) for x in (-0.2, 0.2))
+    >>> [round(float(both([0.0, 0.0, 0.0])), 2) for both in (left | right, left - right)]
+    [-0.3, 0.3]
+    """
+
+    domain: Domain
+    values: Floats
+    diagnostics: Diagnostics = field(default_factory=Diagnostics, repr=False)
+    confidence: NDArray[np.float32] | None = field(default=None, repr=False, kw_only=True)
+    solid: SolidQueries | None = field(default=None, repr=False, kw_only=True)
+    source: SourceTerm | None = field(default=None, repr=False, kw_only=True)
+    coarse: Field[Grid] | None = field(default=None, repr=False, kw_only=True)
+    finer: Field[IntrinsicTriangulation] | None = field(default=None, repr=False, kw_only=True)
+
+    __array_priority__ = 1000.0  # so that NumPy's numbers leave operators to the field
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.domain, FieldDomain):
+            raise UnsupportedTypeError(
+                f"{self.domain!r:.80} is no domain of fields",
+                remedy="pass a grid, tets or a surface",
+                element="domain",
+            )
+        instance(self.diagnostics, Diagnostics, "diagnostics")
+        instance(self.coarse, Field, "coarse")
+        instance(self.finer, Field, "finer")
+        values = self.domain._checked(self.values)
+        object.__setattr__(self, "values", values)
+        if isinstance(self.domain, Band) and self.coarse is None:
+            raise GeometryError("a field in a band needs a coarse field for the nodes beyond it", element="coarse")
+        if self.confidence is not None:
+            confidence = array_of(self.confidence, "confidence")
+            if confidence.dtype.kind not in "biuf" or confidence.shape != values.shape:
+                raise GeometryError(
+                    f"confidence is an array of {confidence.dtype} of shape {confidence.shape}",
+                    remedy=f"give numbers of shape {values.shape}",
+                    element="confidence",
+                )
+            if not isinstance(self.domain, Band):  # those of bands are in half precision
+                object.__setattr__(self, "confidence", confidence.astype(np.float32, copy=False))
+
+    def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
+        """φ at points: exact where the field has its solid, else that of `interpolate`.
+
+        Parameters
+        ----------
+        points : (..., d) float, Curve or SurfacePoints
+            Positions, in the units of the domain. Along surfaces, the closest points on the surface are taken, and
+            `Curve` and `SurfacePoints` are evaluated in the faces through which they are given.
+
+        Returns
+        -------
+        (...) float
+            Signed distances, in the shape of the points: one number for one point.
+        """
+        return self.interpolate(points) if self.solid is None else self.solid.distance(cast("ArrayLike", points))
+
+    def interpolate(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
+        """φ at points, from the values around them.
+
+        On grids by multilinear interpolation between the nodes that have a value, beyond a band between the coarse
+        ones; on tets to second order, from values and gradients at the vertices; on surfaces linearly in each triangle.
+        Outside a grid or tets, φ continues linearly from the nearest point of the domain, along the gradient there:
+        this is continuous, and for a convex shape inside the box of a grid a lower bound of the distance.
+
+        Parameters
+        ----------
+        points : (..., d) float, Curve or SurfacePoints
+            As for calling the field.
+
+        Returns
+        -------
+        (...) float
+            Signed distances; NaN where no value is near.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> line = Field(sh.Grid([0.0], 1.0, [3]), [0.0, 1.0, 3.0])
+        >>> line.interpolate([[0.5], [2.5]])  # between nodes, and beyond the last one
+        array([0.5, 4. ])
+        """
+        return self.finest._interpolant(points)
+
+    def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
+        """∇φ in space at points: exact where the field has its solid, else that of the interpolant.
+
+        On grids these are central differences, interpolated; on tets volume-weighted means at the vertices,
+        interpolated; on surfaces the gradient in the triangle. Outside a grid or tets, it is the gradient at the
+        nearest point of the domain.
+
+        Parameters
+        ----------
+        points : (..., d) float, Curve or SurfacePoints
+            As for calling the field.
+
+        Returns
+        -------
+        (..., d) float
+            Gradients; of length about 1, since φ is a distance.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> mesh = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> Field(mesh, [-0.5, 0.5, 0.5, -0.5]).gradient([[0.75, 0.5, 0.0]]).tolist()
+        [[1.0, 0.0, 0.0]]
+        """
+        if self.solid is not None:
+            return self.solid.closest(cast("ArrayLike", points)).gradients
+        return self.finest._interpolant.gradient(points)
+
+    @property
+    def cell_gradients(self) -> Floats:
+        """(m, 3) ∇φ in each triangle or tet, where φ is linear; zero in degenerate triangles.
+
+        Where φ was computed on finer triangles, `gradient` is more accurate.
+        """
+        gradients = getattr(self.restrict()._interpolant, "cell_gradients", None)
+        if gradients is None:
+            raise UnsupportedTypeError("φ is linear in no cell of a grid", remedy="use gradient", element="domain")
+        return cast("Floats", gradients)
+
+    @cached_property
+    def _interpolant(self) -> Interpolant:
+        return self.domain._interpolant(self.values, None if self.coarse is None else self.coarse.interpolate)
+
+    def closest(self, points: ArrayLike) -> Closest:
+        """Find the nearest point of the solid's surface for points in space: `Solid.closest`.
+
+        Parameters
+        ----------
+        points : (..., 3) float
+            Positions, in the units of the domain; they may lie outside of it.
+
+        Returns
+        -------
+        Closest
+            Distances, positions, faces and where in them, gradients, confidence.
+
+        Raises
+        ------
+        SourceError
+            If the field has no solid: it was computed otherwise, or read from a file without one.
+
+        Examples
+        --------
+        >>> from signedheat import samples, signed_distance
+        >>> phi = signed_distance(samples.sphere(2), resolution=16)
+        >>> phi.closest([[0.0, 0.0, 3.0]]).points.round(3).tolist()
+        [[0.0, 0.0, 1.0]]
+        """
+        if self.solid is None:
+            raise SourceError(
+                "the field holds no solid",
+                remedy="take it from signed_distance or Solid.field; of files, only .npz keep it",
+                element="field",
+            )
+        return self.solid.closest(points)
+
+    def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
+        """Return the confidence at points: 1 where the nearest surface is given, less where it had to be completed.
+
+        Parameters
+        ----------
+        points : (..., d) float
+            Positions, such as the vertices of an offset.
+
+        Returns
+        -------
+        (...) float
+            From 0 to 1. Outside the domain it is that of the nearest point of it; it is 1 if the field has none.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> line = Field(sh.Grid([0.0], 1.0, [2]), [0.0, 1.0], confidence=np.array([1.0, 0.5]))
+        >>> line.confidence_at([[0.5]]).tolist()
+        [0.75]
+        """
+        if self.solid is not None:
+            return self.solid.closest(points).confidence
+        inside = self.domain._clipped(points)
+        if self.confidence is None:
+            return np.ones(np.shape(self._interpolant(inside)), dtype=np.float32)[()]
+        beyond: Any = None if self.coarse is None else self.coarse.confidence_at
+        found = self.domain._interpolant(self.confidence.astype(np.float32), beyond)(inside)
+        return np.clip(found, 0, 1).astype(np.float32)
+
+    @property
+    def finest(self) -> Field[FieldDomain]:
+        """The field where φ was computed: `finer`, if its values are still the same, or the field itself."""
+        finer = self.finer
+        if finer is None or not np.array_equal(finer.values[: len(self.values)], self.values, equal_nan=True):
+            return self
+        return finer
+
+    @overload
+    def restrict(self: Field[IntrinsicTriangulation]) -> Field[TriangleMesh]: ...
+    @overload
+    def restrict(self: Field[Embedded]) -> Field[Embedded]: ...
+    @overload
+    def restrict(self) -> Field[FieldDomain]: ...
+    def restrict(self) -> Field[FieldDomain]:
+        """Restrict φ to a plainer domain: from a band to the coarse grid, from an intrinsic triangulation to its mesh.
+
+        Returns
+        -------
+        Field
+            This field itself on any other domain.
+
+        See Also
+        --------
+        Field.expand : The same with all detail.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> strip = sh.TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+        >>> better = sh.intrinsic_delaunay(strip, refine=True)
+        >>> phi = sh.SignedHeatSolver(better).distance(strip.points_at(0))
+        >>> len(phi.values) == better.n_vertices, len(phi.restrict().values)
+        (True, 4)
+        """
+        if self.coarse is not None:
+            return self.coarse
+        domain = self.domain._restricted()
+        if domain is self.domain:
+            return self
+        return Field(domain, self.values[: domain._values_shape[0]], self.diagnostics, source=self.source)
+
+    def expand(self) -> Field[FieldDomain]:
+        """Give φ on a domain in space that has all its detail, to draw, save or measure.
+
+        A band becomes its whole grid, with nodes beyond it interpolated from the coarse field. An intrinsic
+        triangulation, also that of `finer`, becomes the flat polygons into which it and its mesh cut one another
+        (`common_subdivision`). A cut surface becomes a mesh whose vertices are doubled along the cut; elsewhere these
+        have the mean of the values of the corners there.
+
+        Returns
+        -------
+        Field
+            This field itself on any other domain.
+
+        See Also
+        --------
+        Field.restrict : The same with less detail.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> band = sh.complete(sh.samples.sphere(2)).field(resolution=48, band=0.2)
+        >>> band.values.size < band.expand().values.size == band.domain.n_nodes
+        True
+        """
+        fine = self.finest
+        if isinstance(fine.domain, IntrinsicTriangulation):
+            polygons, interpolate = common_subdivision(fine.domain)
+            no_face = np.diff(interpolate.indptr) == 0  # rows that interpolate from nothing
+            return Field(polygons, np.where(no_face, np.nan, interpolate @ fine.values), self.diagnostics)
+        domain, values = self.domain._expanded(self.values, None if self.coarse is None else self.coarse.interpolate)
+        return self if domain is self.domain else Field(domain, values, self.diagnostics, solid=self.solid)
+
+    def plain(self) -> Field[FieldDomain]:
+        """Give φ on a domain that files and viewers know: of voxels, their faces; elsewhere as `restrict` or `expand`.
+
+        Returns
+        -------
+        Field
+            This field itself if its domain is one.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> cube = sh.DigitalSurface([[[True]]])
+        >>> Field(cube, np.zeros(cube.n_vertices)).plain().domain
+        TriangleMesh(14 vertices, 24 faces)
+        """
+        domain, values = self.domain._plain(self.values)
+        return self if domain is self.domain else Field(domain, values, self.diagnostics)
+
+    @overload
+    def contour(self: Field[Grid[Literal[3]]] | Field[TetMesh], level: float = 0.0) -> TriangleMesh: ...
+    @overload
+    def contour(self: Field[Grid[Literal[2]]], level: float = 0.0) -> list[Polyline]: ...
+    @overload
+    def contour(self: Field[Grid], level: float = 0.0) -> TriangleMesh | list[Polyline]: ...
+    @overload
+    def contour(self: Field[LinearDomain], level: float = 0.0) -> list[Curve]: ...
+    @overload
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline] | list[Curve]: ...
+    @public_call
+    def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline] | list[Curve]:
+        """Extract the level set φ = level.
+
+        In space, a surface: closed, manifold, with normals pointing to greater φ. Where it leaves the domain, as the
+        completion of an open shape may do, it is closed along the box of the grid (1 % of a cell outside) or the
+        boundary of the tets; where it meets nodes without a value, along the last nodes before them.
+
+        In the plane and on surfaces, lines, one for each connected component, open or closed, with greater φ to their
+        left. Open ones end where the domain ends, at nodes without a value, and at cuts.
+
+        Parameters
+        ----------
+        level : float
+            The level, in the units of the domain.
+
+        Returns
+        -------
+        TriangleMesh, list of Polyline or list of Curve
+            The surface in space, the polylines in the plane, or the curves on a surface.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the level anywhere on the domain.
+        GeometryError
+            If the grid has neither 2 nor 3 dimensions, values are infinite, or there is no cell with values.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid = sh.Grid((-1, -1), 0.1, (21, 21))
+        >>> disk = Field(grid, np.linalg.norm(grid.points, axis=-1) - 0.5)
+        >>> [circle] = disk.contour(0.25)
+        >>> circle.closed, round(circle.length / (2 * np.pi), 2)
+        (True, 0.75)
+        """
+        level, fine = finite_number(level, "level"), self.finest
+        exact = None if self.solid is None else self.solid.distance
+        found: TriangleMesh | list[Polyline] | list[Curve] = fine.domain._level_set(fine.values, level, exact)
+        return found
+
+    @overload
+    def offset(self: Field[Grid[Literal[3]]] | Field[TetMesh], distance: float) -> TriangleMesh: ...
+    @overload
+    def offset(self: Field[Grid[Literal[2]]], distance: float) -> list[Polyline]: ...
+    @overload
+    def offset(self: Field[Grid], distance: float) -> TriangleMesh | list[Polyline]: ...
+    @overload
+    def offset(self: Field[LinearDomain], distance: float) -> list[Curve]: ...
+    @overload
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline] | list[Curve]: ...
+    def offset(self, distance: float) -> TriangleMesh | list[Polyline] | list[Curve]:
+        """Offset the shape by a signed distance, and refuse that if a grid or tets are too small for it.
+
+        Parameters
+        ----------
+        distance : float
+            Signed distance, positive outward, in the units of the domain.
+
+        Returns
+        -------
+        TriangleMesh, list of Polyline or list of Curve
+            With the edges and corners of the offset if the field holds its solid and is no band; else as `contour`.
+
+        Raises
+        ------
+        OutsideError
+            If φ does not take the value, or the offset leaves the grid or the tets although the shape itself does not.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> grid = sh.Grid((-1, -1), 0.1, (21, 21))
+        >>> Field(grid, np.linalg.norm(grid.points, axis=-1) - 0.5).offset(-0.1)
+        [Polyline(32 points, closed)]
+        """
+        distance, whole = finite_number(distance, "distance"), self.coarse or self
+        walls = whole.domain._values_at_walls(whole.values)
+        if isinstance(self.solid, MakesFields) and self.coarse is None:
+            if np.nanmin(self.values) < distance < np.nanmin(walls):
+                return cast("TriangleMesh", self.solid._surface_on(self, distance))
+        refuse_beyond_walls(walls, distance)
+        return self.contour(distance)
+
+    def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
+        """Write the level set φ = level in space to a file; that of a band part by part, so that it may exceed memory.
+
+        Parameters
+        ----------
+        path : str or path
+            A ``.ply`` file. An existing one survives a failure.
+        level : float
+            See `contour`. In bands, creases are left as the cells cut them.
+
+        Returns
+        -------
+        vertices, faces : int
+            How many were written.
+
+        Raises
+        ------
+        OutsideError, GeometryError
+            As `contour`; also if the level set is made of lines.
+        FileFormatError
+            If the file is of another kind, or cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> from signedheat import complete, samples
+        >>> ball = complete(samples.sphere(4)).field(spacing=0.02, band=0.1)
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     vertices, faces = ball.save_contour(f"{folder}/ball.ply", 0.05)
+        >>> 2 * vertices - faces  # closed, without handles
+        4
+        """
+        exact = None if self.solid is None else self.solid.distance
+        parts = self.domain._level_parts(self.values, finite_number(level, "level"), exact)
+        return cast("tuple[int, int]", ply.write_parts(parts, path))
+
+    def to_pyvista(self) -> pyvista.DataSet:
+        """Convert to PyVista.
+
+        Returns
+        -------
+        pyvista.DataSet
+            `pyvista.ImageData` of a grid, with z = 0 in the plane, and of a band that of the coarse field;
+            `pyvista.UnstructuredGrid` of tets; `pyvista.PolyData` of a surface, cut open where φ jumps. The values are
+            point data ``signed_distance``; ``confidence`` is there, too, where the field has it.
+
+        Raises
+        ------
+        MissingPackageError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> Field(sh.Grid((0, 0), 1.0, (2, 2)), np.zeros((2, 2))).to_pyvista().array_names
+        ['signed_distance']
+        """
+        plain = (self.coarse or self).plain()
+        drawn: pyvista.DataSet = cast("Displayed", plain.domain).to_pyvista()
+        if plain.confidence is not None:
+            drawn.point_data["confidence"] = plain.confidence.ravel(order="F")
+        with_values(drawn, plain.values.ravel(order="F"))
+        return drawn
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write to a file, in the format given by its extension; `signedheat.read_field` reads most of them.
+
+        Parameters
+        ----------
+        path : str or path
+            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``; in a band ``.npz``, ``.vdb`` or, with
+            all nodes of the grid, ``.vti``; on tets ``.vtu``, ``.vtk`` or ``.msh``; on surfaces ``.ply`` or ``.vtp``
+            with a property ``signed_distance`` per vertex, ``.obj`` with a texture coordinate, or ``.npz``. Not read
+            are ``.vdb`` and ``.obj``. The file is written under a temporary name and renamed, so that an existing one
+            survives a failure.
+
+        Raises
+        ------
+        FileFormatError
+            If the format is not one of these, or the file cannot be written.
+        MissingPackageError
+            If the format needs meshio, and it is not installed.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> import signedheat as sh
+        >>> line = Field(sh.Grid(0.0, 1.0, 2), [0.0, 1.0])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     line.save(f"{folder}/line.npz")
+        ...     sh.read_field(f"{folder}/line.npz").values.tolist()
+        [0.0, 1.0]
+        """
+        files.write_field(self, path)
+
+    def with_values(self, values: ArrayLike) -> Field[Domain]:
+        """Return a field of other values on the same domain.
+
+        Parameters
+        ----------
+        values : array
+            In the shape of `values`.
+
+        Returns
+        -------
+        Field
+            Without diagnostics, source, confidence and solid.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> line = Field(sh.Grid(0.0, 1.0, 3), [-1.0, 0.0, 1.0])
+        >>> line.with_values(line.values**2).values.tolist()
+        [1.0, 0.0, 1.0]
+        """
+        return Field(self.domain, cast("NDArray[Any]", values))
+
+    def combined_with(self, other: Field[FieldDomain], rule: Rule) -> Field[Domain]:
+        """Combine the values of two fields on one domain by a rule.
+
+        Parameters
+        ----------
+        other : Field
+            On the same domain.
+        rule : callable
+            Takes two arrays of values and returns one, such as `np.minimum`.
+
+        Returns
+        -------
+        Field
+            With the values that the rule returns.
+
+        Raises
+        ------
+        GeometryError
+            If the fields lie on different domains.
+        UnsupportedTypeError
+            If these are of different kinds.
+
+        Examples
+        --------
+        >>> import signedheat as sh
+        >>> tet = sh.TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
+        >>> phi = Field(tet, [0.0, 1.0, 2.0, 3.0])
+        >>> phi.combined_with(3.0 - phi, np.minimum).values.tolist()
+        [0.0, 1.0, 1.0, 0.0]
+        """
+        domain = self.domain._shared(other.domain)
+        values = rule(self.values, other.values)
+        if self.coarse is not None and other.coarse is not None:
+            coarse = self.coarse.combined_with(other.coarse, rule)
+            return Field(domain, np.asarray(values, dtype=self.values.dtype), coarse=coarse)
+        fine = [each.finer.domain for each in (self, other) if each.finer is not None and each.finest is each.finer]
+        if not fine:
+            return Field(domain, values)
+        finest = max(fine, key=lambda triangulation: triangulation.n_vertices)
+        there = rule(self._at_vertices_of(finest), other._at_vertices_of(finest))
+        there[: len(values)] = values
+        return Field(domain, values, finer=Field(finest, there))
+
+    def _at_vertices_of(self, triangulation: IntrinsicTriangulation) -> Floats:
+        """φ at the vertices of an intrinsic triangulation of the mesh; NaN at vertices without a face."""
+        if self.finest.domain is triangulation:
+            return self.finest.values
+        faces, weights = triangulation.vertex_places
+        used = np.flatnonzero(faces >= 0)
+        values = np.full(len(faces), np.nan)
+        values[used] = self(SurfacePoints(faces[used], weights[used]))
+        return values
+
+    def _mapped(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Field[Domain]:
+        """Return a field of changed values, without the diagnostics."""
+        return self.combined_with(self, lambda phi, _: change(phi))
+
+    def _scaled(self, factor: float) -> Field[Domain]:
+        """Return the field times a number; it is exact if this one is and the number is neither 0 nor infinite."""
+        exact = self.solid is not None and factor != 0 and math.isfinite(factor)
+        result = self._mapped(lambda phi: phi * factor)
+        coarse = None if self.coarse is None else self.coarse._scaled(factor)
+        return replace(
+            result,
+            domain=self.domain._stretched(factor),
+            confidence=self.confidence,
+            solid=scaled(self.solid, factor) if exact and self.solid is not None else None,
+            coarse=coarse,
+        )
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __neg__(self) -> Field[Domain]:
+        return self._scaled(-1.0)
+
+    def __abs__(self) -> Field[Domain]:
+        return self._mapped(np.abs)
+
+    def __mul__(self, factor: Number) -> Field[Domain]:
+        return self._scaled(finite(factor)) if isinstance(factor, NUMBER_TYPES) else NotImplemented
+
+    def __truediv__(self, divisor: Number) -> Field[Domain]:
+        if not isinstance(divisor, NUMBER_TYPES):
+            return NotImplemented
+        return self._scaled(finite(1.0 / finite(divisor) if divisor else np.inf))
+
+    def __add__(self, summand: Number) -> Field[Domain]:
+        if not isinstance(summand, NUMBER_TYPES):
+            return NotImplemented
+        level = finite(summand)
+        return self._mapped(lambda phi: phi + level) if level else self._scaled(1.0)
+
+    def __rsub__(self, level: Number) -> Field[Domain]:
+        if not isinstance(level, NUMBER_TYPES):
+            return NotImplemented
+        number = finite(level)
+        return self._mapped(lambda phi: number - phi)
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __or__(self, other: Field[FieldDomain] | MakesFields) -> Field[Domain]:
+        """Union: inside where at least one of the two fields is."""
+        return self._of_solids(other, operator.or_) or combined(self, other, np.less_equal, 0.0)
+
+    def __and__(self, other: Field[FieldDomain] | MakesFields) -> Field[Domain]:
+        """Intersection: inside where both fields are."""
+        return self._of_solids(other, operator.and_) or combined(self, other, np.greater_equal, 0.0)
+
+    def __sub__(self, other: Field[FieldDomain] | MakesFields | Number) -> Field[Domain]:
+        """Difference: inside where this field is and the other is not; a number is subtracted from the values."""
+        if isinstance(other, NUMBER_TYPES):
+            return self + -finite(other)
+        exact = self._of_solids(other, operator.sub)
+        return exact or combined(self, checked(self, other)._mapped(np.negative), np.greater_equal, 0.0)
+
+    def __invert__(self) -> Field[Domain]:
+        """Complement: inside and outside exchanged."""
+        return self._scaled(-1.0)
+
+    def _of_solids(self, other: object, operation: Callable[[Any, Any], Any]) -> Field[Domain] | None:
+        """Compute the field of two fields' combined solids; None if one has none, or nothing is inside the result."""
+        theirs = other if isinstance(other, MakesFields) else getattr(other, "solid", None)
+        if not isinstance(self.solid, MakesFields) or not isinstance(theirs, MakesFields):
+            return None
+        if not isinstance(other, MakesFields):
+            checked(self, other)
+        try:
+            solid = operation(self.solid, theirs)
+        except SourceError:
+            return None
+        return cast("Field[Domain]", solid.field_on(self))
+
+    def __repr__(self) -> str:
+        low, high = (float(f.reduce((self.coarse or self).values, axis=None)) for f in (np.fmin, np.fmax))
+        between = "exact" if self.solid is not None else "interpolated"
+        return f"Field({self.domain!r}, values from {low:.4g} to {high:.4g}, {between})"
+
+
+def refuse_beyond_walls(walls: NDArray[Any], distance: float) -> None:
+    """Raise `OutsideError` if values at a domain's walls show that a level set leaves it, but the shape does not."""
+    if not walls.size:
+        return
+    low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
+    if (low > 0 or high < 0) and low < distance < high:
+        raise OutsideError(
+            f"the surface at distance {distance:g} leaves the domain, which holds distances up to "
+            f"{low if low > 0 else high:g}",
+            remedy=f"use a domain that reaches more than {abs(distance):g} beyond the shape (for a grid, padding), or "
+            "a larger diffusion where wide gaps stay open",
+        )
+
+
+def combined(
+    a: Field[Domain],
+    b: Field[FieldDomain] | MakesFields,
+    takes_first: Callable[[Floats, Floats], Bools],
+    bulge: float,
+) -> Field[Domain]:
+    """Take `a` where `takes_first(a, b)`, else `b`; a blend of width |bulge| raises φ, or lowers it if `bulge` < 0."""
+
+    def rule(one: Floats, other: Floats) -> Floats:
+        values = np.where(takes_first(one, other), one, other)
+        if bulge:
+            near = np.maximum(abs(bulge) - np.abs(one - other), 0.0)
+            values = values + near**2 / (4 * bulge)
+        values[np.isnan(one) | np.isnan(other)] = np.nan
+        return values
+
+    return a.combined_with(checked(a, b), rule)
+
+
+def checked(a: object, b: object) -> Field[FieldDomain]:
+    """Return the second field, computed on the domain of the first if it is a solid; refuse what does not fit."""
+    if isinstance(a, Field) and isinstance(b, MakesFields):
+        b = b.field_on(a)
+    if not isinstance(a, Field) or not isinstance(b, Field):
+        other = type(a if isinstance(b, Field) else b).__name__
+        raise UnsupportedTypeError(
+            f"a field is not combined with a {other}", remedy="pass a field on the same domain", element=other
+        )
+    a.domain._shared(b.domain)
+    return b
