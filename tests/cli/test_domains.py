@@ -233,12 +233,12 @@ def test_tets_from_the_command_line(tmp_path, capsys):
     assert "open edges             0" in succeed(capsys, "info", tmp_path / "shell.stl")
     for name in ("sharp.vtu", "shell.stl"):
         succeed(capsys, "view", tmp_path / name, "-o", tmp_path / "picture.png")
-    fields[0].mesh.save(tmp_path / "bare.vtu")
+    fields[0].domain.save(tmp_path / "bare.vtu")
     succeed(capsys, "view", tmp_path / "bare.vtu", "-o", tmp_path / "picture.png")
-    fields[0].mesh.save(tmp_path / "own.mesh")
+    fields[0].domain.save(tmp_path / "own.mesh")
     own = ("--tets", tmp_path / "own.mesh", "--preview", tmp_path / "slices.png")
     succeed(capsys, "volume", tmp_path / "ball.stl", *own, "-o", tmp_path / "own.msh")
     np.testing.assert_allclose(sh.read_field(tmp_path / "own.msh").values, fields[0].values, atol=1e-9)
     assert matplotlib.image.imread(tmp_path / "slices.png")[..., :3].std() > 0.05
     told = json.loads(succeed(capsys, "info", tmp_path / "own.mesh", "--json"))
-    assert told["n_tets"] == fields[0].mesh.n_tets
+    assert told["n_tets"] == fields[0].domain.n_tets

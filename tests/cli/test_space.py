@@ -188,7 +188,7 @@ def test_info_of_shapes_and_fields(tmp_path, ball, capsys):
     assert "open edges" in told and told.splitlines()[0].split(maxsplit=1) == ["verdict", summary["verdict"]]
     field = str(tmp_path / "phi.vti")
     succeed(capsys, "volume", ball, "-o", field, "--resolution", "16")
-    assert json.loads(succeed(capsys, "info", field, "--json"))["kind"] == "GridField"
+    assert json.loads(succeed(capsys, "info", field, "--json"))["domain"] == "Grid"
     cloud = str(tmp_path / "points.xyz")
     samples.oriented_points(samples.sphere(2), 50).save(cloud)
     assert json.loads(succeed(capsys, "info", cloud, "--json"))["has_normals"] is True
@@ -333,7 +333,7 @@ def test_tiles_go_on_where_they_were_and_give_what_the_band_gives(tmp_path, ball
     succeed(capsys, "volume", ball, "-o", other, *options, "--quiet")
     tiled, single = sh.read_field(output), sh.read_field(other)
     np.testing.assert_array_equal(tiled.values, single.values)
-    np.testing.assert_array_equal(tiled.blocks.places, single.blocks.places)
+    np.testing.assert_array_equal(tiled.domain.blocks.places, single.domain.blocks.places)
     assert "another" in fail(capsys, "volume", ball, "-o", output, *options[:-1], "0.16", "--tiles", store)
     fail(capsys, "volume", ball, "-o", output, "--tiles", store, code=2)
     fail(capsys, "volume", ball, "-o", output, *options, "--workers", "2", code=2)

@@ -90,7 +90,7 @@ def test_fields_on_surfaces_can_be_contoured_viewed_and_told_about(files, capsys
     assert main(["contour", field, "99", "-o", str(files / "line.obj")]) == 1
     capsys.readouterr()
     assert main(["info", field, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["kind"] == "VertexField"
+    assert json.loads(capsys.readouterr().out)["domain"] == "TriangleMesh"
     assert main(["view", field, "-o", str(files / "view.png")]) == 0
     assert (files / "view.png").stat().st_size > 20_000
 

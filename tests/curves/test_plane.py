@@ -259,9 +259,7 @@ def drawing():
 def test_a_drawing_is_completed_alike_wherever_distance_is_asked(side, drawing):
     lines, everywhere = drawing
     grid = sh.Grid.around([[0.7, 0.7], [0.7 + side, 0.7 + side]], 19, padding=0.0)  # at, and around, a missing corner
-    inside = (grid.points >= everywhere.domain.origin).all(axis=-1) & (grid.points <= everywhere.domain.upper).all(
-        axis=-1
-    )
+    inside = everywhere.domain.contains(grid.points)
     field = sh.signed_distance(lines, grid)
     np.testing.assert_allclose(field.values[inside], everywhere(grid.points[inside]), atol=0.03)
     np.testing.assert_allclose(field.values, distance_to_box(grid.points, (-1, -1), (1, 1)), atol=0.15)

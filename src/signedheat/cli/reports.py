@@ -53,7 +53,7 @@ def report(file: str, arguments: Namespace) -> Summary:
         summary = image_report(file, field)
         return summary, _table(summary)
     if field is not None:
-        summary = {"file": file, "kind": type(field).__name__, **describe(field)}
+        summary = {"file": file, "kind": "Field", "domain": type(field.domain).__name__, **describe(field)}
         del summary["seconds"]
         return summary, _table(summary)
     if is_planar(file):
