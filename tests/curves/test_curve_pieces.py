@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 import signedheat as sh
 from shapes.surfaces import disk
 from signedheat.curves.curve_distance import CurvesTaken
+from signedheat.errors import InexactWarning
 from signedheat.samples import sphere
 
 
@@ -149,6 +152,23 @@ def test_orienting_keeps_rings_that_face_each_other_too():
 
 
 def test_rings_nearer_than_their_gaps_are_long():
-    """Three pieces each, with gaps nearly three times as long as the rings are apart: taken as they are drawn."""
+    """Three pieces each, with gaps more than twice as long as the rings are apart: which is meant is a guess."""
     mesh = tube()
-    assert not sh.orientation(rings(mesh, 0.3, 3, 0.4), mesh).turned.any()
+    with pytest.warns(InexactWarning, match="ran against about as much of the others"):
+        sh.signed_distance(rings(mesh, 0.3, 3, 0.4), mesh)
+
+
+@pytest.mark.parametrize("radii", [(0.45, 0.5, 0.56), (0.5, 0.53, 0.6), (0.46, 0.5, 0.52, 0.55, 0.6)])
+def test_loops_side_by_side_that_run_alike_agree(radii):
+    """A loop drawn again and again, by hand: none of them is flipped to bound a narrow band."""
+    mesh = disk(24)
+    angle = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    loops = [mesh.polyline(radius * ring, closed=True) for radius in radii]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InexactWarning)  # that distance jumps between them, or that one is left out
+        phi = sh.signed_distance(loops, mesh)
+    away = np.linalg.norm(mesh.vertices, axis=1)
+    clear = (away < min(radii) - 0.05) | (away > max(radii) + 0.05)
+    assert (np.sign(phi.values) == np.sign(np.mean(radii) - away))[clear].all()
+    assert phi.diagnostics.note(CurvesTaken) is None or not phi.diagnostics.note(CurvesTaken).turned
