@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 import signedheat as sh
 from shapes.bodies import box
 from shapes.grid_cases import assert_closed_manifold
+from shapes.triangulated import grid
 from signedheat import samples
 from signedheat.errors import InexactWarning
 from signedheat.mesh.pinches import separated
@@ -79,6 +80,28 @@ def test_bodies_less_their_cavities():
         assert sorted(np.sign(bodies.volumes)) == [-1, 1, 1]
         assert volume_of(bodies.united) == pytest.approx(volume, rel=1e-12)
         assert same_solid(bodies.united, windings)
+
+
+def ring(inner, outer, seed):
+    """A square turned about an axis by eighths, in general position, to four digits."""
+    angles, section = np.pi * np.arange(8) / 4, np.array([[inner, 0], [outer, 0], [outer, 0.3], [inner, 0.3]])
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    places = np.concatenate([section[:, :1] * circle[:, None], np.broadcast_to(section[:, 1:], (8, 4, 1))], axis=2)
+    mesh = grid(
+        (places + np.array([1.3, 1.0, 0.0])) @ Rotation.random(random_state=seed).as_matrix(), around=1, across=True
+    )
+    return rounded(mesh, 4)
+
+
+@pytest.mark.parametrize("seed", [0, 4, 6])
+def test_unions_have_no_slits_where_bodies_touch(seed):
+    """Two rings with common corners, whose sides are flat in places, and cut along other diagonals."""
+    rings = ring(0.2, 0.35, seed), ring(0.35, 0.45, seed)
+    mesh, windings = samples.union(*rings), Windings(corners(*rings))
+    boundary = whole_boundary(windings.triangles, windings, mesh)
+    united = Bodies.of_mesh(mesh, windings).united
+    assert same_solid(boundary, windings) and not same_solid(united, windings)
+    assert volume_of(boundary) == pytest.approx(volume_of(united), rel=1e-8)
 
 
 def test_the_proof_fails_for_any_other_solid():

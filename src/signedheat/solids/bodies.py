@@ -146,20 +146,26 @@ def whole_boundary(triangles: Floats, windings: Windings, mesh: TriangleMesh | N
 
     `triangles` are those of a cut that is not, and `mesh` is the mesh that the chain was made of, if that is known.
     """
-    found = (made for made in _candidates(triangles, windings, mesh) if made is not None)
-    return next((made for made in found if same_solid(made, windings)), None)
+    return next((made for made in _candidates(triangles, windings, mesh) if same_solid(made, windings)), None)
 
 
-def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None) -> Iterator[Floats | None]:
+def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None) -> Iterator[Floats]:
     """Yield one boundary after the other."""
-    if mesh is not None:
-        bodies = Bodies.of_mesh(mesh, windings)
-        yield None if bodies is None else bodies.united
-    bodies = Bodies.of_chain(windings)
-    yield None if bodies is None else bodies.united
+    for given in (mesh, None) if mesh is not None else (None,):
+        bodies = Bodies.of_chain(windings) if given is None else Bodies.of_mesh(given, windings)
+        united = None if bodies is None else bodies.united
+        if united is not None:
+            yield united
+            yield _without_slits(united)
     for chain in (triangles, windings.triangles):
         if len(chain):
             yield _coned(*_cut_again(chain, windings))
+
+
+def _without_slits(triangles: Floats) -> Floats:
+    """Drop what manifold3d may leave where bodies touch: faces that lie on others, which face the opposite way."""
+    pieces = arranged(*indexed(triangles))
+    return _coned(pieces.points, without_doubles(pieces.faces))
 
 
 def _cut_again(triangles: Floats, windings: Windings) -> tuple[Floats, Ints]:
