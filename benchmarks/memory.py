@@ -19,11 +19,11 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples
 from signedheat.curves.jumping_distance import memory_estimate as piecewise_estimate
-from signedheat.foreign import SurfaceShape
 from signedheat.grids.blocks import BLOCK_NODES
 from signedheat.grids.grid_discretization import bytes_of_area
 from signedheat.grids.grid_discretization import memory_estimate as grid_estimate
 from signedheat.memory import libraries
+from signedheat.shapes.foreign import SurfaceShape
 from signedheat.solids.completion import bytes_to_complete, complete
 from signedheat.solids.sampling import BYTES_PER_SAMPLE
 from signedheat.solids.tiles import BYTES_AT_WORK, BYTES_IN_BAND, BYTES_PER_DENSE_NODE, blocks_near

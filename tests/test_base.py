@@ -13,15 +13,15 @@ from signedheat.arrays import Frozen, LastUsed, ShortRepr, fingerprint, short
 from signedheat.batches.inputs import _without_extension
 from signedheat.batches.pool import duration
 from signedheat.errors import MissingPackageError, SignedHeatError
-from signedheat.foreign import is_pair, package_of, what_to_pass
-from signedheat.inspection import inspect
 from signedheat.jobs import command_for, run_cancellable, run_limited, within
 from signedheat.memory import fitting_count, untouched_zeros
+from signedheat.methods import LinearElements
 from signedheat.packages import ensure_installed, missing_package, require
 from signedheat.parallel import connected, in_chunks
-from signedheat.sharpening_methods import LinearElements
+from signedheat.shapes.foreign import is_pair, package_of, what_to_pass
+from signedheat.shapes.inspection import inspect
+from signedheat.shapes.transforms import concatenated, placed
 from signedheat.surfaces.triangle_mesh import TriangleMesh
-from signedheat.transforms import concatenated, placed
 from signedheat.validation import coordinates, finite_number, numbers, shaped, used_bounds
 
 

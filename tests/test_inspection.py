@@ -10,7 +10,7 @@ from refusals import refused
 from shapes.bodies import box
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.inspection import inspect
+from signedheat.shapes.inspection import inspect
 
 
 def counts(mesh, *names):

@@ -8,8 +8,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from .arrays import Frozen, Ints, ShortRepr
-from .words import Sentence, percent
+from .arrays import Frozen, Ints, Sentence, ShortRepr, percent
 
 SMALL_SHARE = 0.005
 """Fraction of the surface up to which its completion, and parts that bound nothing or that a contour misses, are not

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from .arrays import Floats, Ints
 from .errors import UnsupportedTypeError
-from .exchange import ACCEPTED_SHAPES
+from .shapes.exchange import ACCEPTED_SHAPES
 
 
 class SourceTerm(Protocol):

@@ -9,19 +9,19 @@ from typing import Any, Literal, cast, get_args, overload
 
 from numpy.typing import ArrayLike
 
-from .area_elements import bounds_around
-from .calls import are_points, public_call
 from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.curve_distance import distance_to_curves
 from .curves.drawings import distance_to_lines
 from .errors import SourceError, UnsupportedTypeError
 from .fields.field import Field
-from .foreign import ForeignShape, as_list, as_shapes, converted
+from .fields.sharpening import sharpen
 from .grids.grid import Dimension, Grid, room_around
 from .jobs import Progress, within
-from .kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
 from .mesh.polylines import FillRule
-from .sharpening import sharpen
+from .shapes.area_elements import bounds_around
+from .shapes.foreign import ForeignShape, as_list, as_shapes, converted
+from .shapes.kinds import AnySurface, Domain, Polylines, Shapes, Sources, SpaceSources, SurfaceDomain
+from .shapes.transforms import joined_shape
 from .solids.completion import Completing, Completion, Lids, completed
 from .solids.heat_surfaces import Heat
 from .solids.mesh_orientation import orient
@@ -33,8 +33,7 @@ from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .transforms import joined_shape
-from .validation import positive_number, refuse_beside
+from .validation import are_points, positive_number, public_call, refuse_beside
 
 OF_DEFAULT_GRID = ("resolution", "spacing", "padding")
 """Options of `signed_distance` that make the default grid."""

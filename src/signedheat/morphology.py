@@ -12,9 +12,7 @@ from typing import Literal, Protocol, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .area_elements import bounds_around
-from .arrays import Floats
-from .calls import public_call
+from .arrays import Floats, counted
 from .distances import signed_distance
 from .errors import (
     InexactWarning,
@@ -26,15 +24,17 @@ from .errors import (
 )
 from .fields.blends import smooth_difference, smooth_intersection, smooth_union
 from .fields.field import Field
-from .foreign import as_list, as_shape, converted
 from .grids.grid import RESOLUTION, Grid, room_around
 from .grids.polyline import Polyline
 from .jobs import Progress
-from .kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .mesh.triangles import part_volumes
 from .parallel import PointTree
 from .search.face_tree import FaceFeatures, FaceTree
 from .search.nearest_triangles import weights_in
+from .shapes.area_elements import bounds_around
+from .shapes.foreign import as_list, as_shape, converted
+from .shapes.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
+from .shapes.transforms import concatenated
 from .solids.completion import complete
 from .solids.contouring import CONTOUR_PLACES, sharp_surface
 from .solids.gauss import Pieces, sampled
@@ -47,9 +47,17 @@ from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .transforms import concatenated
-from .validation import array_of, callback, chosen, finite_number, flag, numbers, positive_number, refuse_beside
-from .words import counted
+from .validation import (
+    array_of,
+    callback,
+    chosen,
+    finite_number,
+    flag,
+    numbers,
+    positive_number,
+    public_call,
+    refuse_beside,
+)
 
 __all__ = [
     "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",

@@ -6,14 +6,15 @@ from .curves.jumping_distance import piecewise_distance
 from .distances import signed_distance
 from .errors import SignedHeatError
 from .fields.field import Field
-from .foreign import as_shape
-from .geometries import to_shapely
+from .fields.sharpening import sharpen
 from .grids.grid import Grid
 from .grids.polyline import Polyline
 from .grids.redistancing import redistance
 from .io import read, read_field, save
 from .morphology import offset
-from .sharpening import sharpen
+from .shapes.foreign import as_shape
+from .shapes.geometries import to_shapely
+from .shapes.transforms import transform
 from .solids.completion import complete
 from .solids.deviations import deviation
 from .solids.holes import fill_holes
@@ -32,7 +33,6 @@ from .surfaces.surface_curves import Curve, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.lattice import tetrahedralize
 from .tets.tet_mesh import TetMesh
-from .transforms import transform
 
 MODULES = (batches, constraints, errors, io, methods, morphology, results, samples, torch, view)
 """Modules whose contents are used by the name of the module; ``from signedheat import *`` does not import them."""

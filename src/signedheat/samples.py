@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 
 from .fields.field import Field
 from .grids.grid import Grid
+from .shapes.transforms import joined_triangles
 from .surfaces.point_cloud import PointCloud
 from .surfaces.triangle_mesh import TriangleMesh
-from .transforms import joined_triangles
 from .validation import whole_number
 
 __all__ = [

@@ -9,18 +9,17 @@ from itertools import groupby
 from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, overload
 
 from .arrays import Frozen, Ints
-from .calls import public_call, refuse_pair_apart, refuse_uncallable
 from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
 from .errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from .fields.field import Field
 from .fields.solutions import to_field, warned
-from .foreign import ForeignShape, as_list, converted
 from .grids.grid import Dimension, Grid
 from .jobs import Progress, Stopwatch, within
-from .kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
+from .shapes.foreign import ForeignShape, as_list, converted
+from .shapes.kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
 from .surfaces.intrinsic_discretization import Retriangulated, checked_intrinsic, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh
@@ -29,7 +28,7 @@ from .surfaces.source_segments import given_curves, numbers_kept, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .validation import positive_number
+from .validation import positive_number, public_call, refuse_pair_apart, refuse_uncallable
 
 SOURCES_AT_ONCE = 16  # sources diffused at a time
 

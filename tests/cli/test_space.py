@@ -14,7 +14,7 @@ from refusals import refused
 from signedheat import samples
 from signedheat.batches import Job
 from signedheat.cli import main
-from signedheat.inspection import inspect
+from signedheat.shapes.inspection import inspect
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from signedheat import Grid, TriangleMesh, samples
-from signedheat.area_elements import sample_on_grid
+from signedheat.shapes.area_elements import sample_on_grid
 from signedheat.solids.heat_surfaces import blocks_of_dipoles, winding_numbers
 
 

@@ -10,7 +10,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat.cli import main
-from signedheat.inspection import inspect
+from signedheat.shapes.inspection import inspect
 from signedheat.solids.completion import complete
 
 pytestmark = pytest.mark.usefixtures("forked_parsers")

@@ -9,7 +9,7 @@ import signedheat as sh
 from shapes.bodies import box
 from signedheat import samples
 from signedheat.cli import main
-from signedheat.inspection import inspect
+from signedheat.shapes.inspection import inspect
 
 
 def perforated(n: int = 20) -> sh.TriangleMesh:

@@ -10,8 +10,8 @@ import scipy
 
 import signedheat as sh
 from signedheat import samples
-from signedheat.inspection import inspect
 from signedheat.mesh.self_intersections import self_intersections
+from signedheat.shapes.inspection import inspect
 
 CUBE = [[-1, -1, -1], [1, 1, 1]]
 HALVES = np.array([0.7, 0.5, 0.4])

@@ -30,12 +30,13 @@ from ..io.numpy_files import write_npz
 from ..io.scenes import METRES, scale_to, unit_of
 from ..io.shape_files import SHAPE_FORMATS, read, save
 from ..io.voxel_files import LABEL_FORMATS, read_labels
-from ..kinds import ShapeLike
 from ..mesh.components import element_components
 from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import face_areas, part_volumes
 from ..mesh.welding import indexed
 from ..search.face_tree import FaceTree
+from ..shapes.kinds import ShapeLike
+from ..shapes.transforms import transform
 from ..solids.completion import Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
 from ..solids.kept_faces import kept_surface
@@ -47,7 +48,6 @@ from ..solids.solid import Solid
 from ..solver import checked
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import transform
 from ..validation import finite_number, positive_number, whole_number
 from .inputs import Input
 

@@ -29,13 +29,12 @@ from signal import SIG_IGN, SIGINT, Signals, signal
 from types import FunctionType
 from typing import Any
 
-from ..calls import refuse_uncallable
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
 from ..jobs import MOST_THREADS, Announcement, Progress, command_for, logger
 from ..packages import require
 from ..parallel import connected, n_threads
-from ..validation import positive_number, refuse_deleted_folder, whole_number
+from ..validation import positive_number, refuse_deleted_folder, refuse_uncallable, whole_number
 from .inputs import Input, expand, named_path
 from .job import Job
 from .manifest import Manifest, Outcome, State, source_of

@@ -12,9 +12,9 @@ from typing import Any
 
 import signedheat as sh
 
+from ..arrays import counted, percent
 from ..errors import SignedHeatError, SourceError, printable
 from ..jobs import MOST_THREADS
-from ..words import counted, percent
 from .late_imports import files, inputs, pool, shape_files
 from .late_imports import operands as shapes
 from .options import (

@@ -7,8 +7,8 @@ from typing import Any, Literal
 
 import signedheat as sh
 
+from ..arrays import counted, percent
 from ..errors import SourceError, printable
-from ..words import counted, percent
 from .late_imports import curve_completion as closing
 from .late_imports import curve_distance as distance
 from .late_imports import diagnostics, numpy

@@ -9,7 +9,7 @@ import numpy as np
 import signedheat as sh
 from signedheat import samples
 
-from ..inspection import inspect
+from ..shapes.inspection import inspect
 from ..solids.thickness import widths
 
 

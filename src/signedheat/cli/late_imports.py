@@ -11,7 +11,6 @@ if TYPE_CHECKING:
 
     from .. import compiled as compiled
     from .. import diagnostics as diagnostics
-    from .. import inspection as inspection
     from .. import parallel as parallel
     from .. import samples as samples
     from ..batches import inputs as inputs
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from ..curves import curve_distance as curve_distance
     from ..io import files as files
     from ..io import shape_files as shape_files
+    from ..shapes import inspection as inspection
     from ..surfaces import surface_discretization as surface_discretization
     from ..view import windows as windows
     from . import kernel_runs as kernel_runs
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 else:
     numpy = lazy_module("numpy", "commands")
     for path in (
-        *("compiled", "diagnostics", "inspection", "parallel", "samples", "batches.inputs", "batches.pool", "io.files"),
+        *("compiled", "diagnostics", "parallel", "samples", "batches.inputs", "batches.pool", "io.files"),
         *("cli.kernel_runs", "cli.operands", "cli.reports", "curves.curve_completion", "curves.curve_distance"),
-        *("io.shape_files", "surfaces.surface_discretization", "view.windows"),
+        *("io.shape_files", "shapes.inspection", "surfaces.surface_discretization", "view.windows"),
     ):
         globals()[path.rpartition(".")[2]] = lazy_module(f"signedheat.{path}", "commands")

@@ -14,7 +14,7 @@ import numpy as np
 
 import signedheat as sh
 
-from ..arrays import Floats
+from ..arrays import Floats, counted, percent
 from ..constraints import Constraint
 from ..diagnostics import Diagnostics, SampledSource
 from ..distances import grid_around, measured_distance
@@ -30,7 +30,6 @@ from ..memory import refuse_beyond_memory
 from ..solids.completion import Completion, completed
 from ..solids.heat_surfaces import Heat
 from ..tets.tet_discretization import memory_estimate
-from ..words import counted, percent
 from .options import IMAGES, METHOD, REPAIR, is_given, is_planar, is_quiet
 from .terminal import ProgressBar, say
 

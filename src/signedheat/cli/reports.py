@@ -13,11 +13,10 @@ import numpy as np
 
 import signedheat as sh
 
-from ..area_elements import bounds_around
+from ..arrays import counted, percent
 from ..errors import SourceError, printable
 from ..geodesics.shortest_paths import gaps
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
-from ..inspection import CloudReport, SurfaceReport, TetReport
 from ..io import read
 from ..io.files import extension
 from ..io.key_figures import inspected, shape_figures
@@ -27,11 +26,12 @@ from ..memory import available_memory
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..mesh.triangles import face_areas
+from ..shapes.area_elements import bounds_around
+from ..shapes.inspection import CloudReport, SurfaceReport, TetReport
 from ..solids.mesh_orientation import Orientation
 from ..solids.thickness import Widths
 from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_DENSE_NODE
 from ..surfaces.source_segments import segments_of
-from ..words import counted, percent
 from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import signedheat as sh
 
+from ..arrays import Sentence, counted, percent
 from ..errors import printable
 from ..packages import require
-from ..words import Sentence, counted, percent
 from .late_imports import operands as shapes
 from .options import (
     COMPLETION_STEPS,

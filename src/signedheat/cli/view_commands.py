@@ -14,9 +14,9 @@ from typing import Any
 
 import signedheat as sh
 
+from ..arrays import counted, percent
 from ..errors import FileFormatError, MissingPackageError, SignedHeatError, printable
 from ..jobs import run_limited
-from ..words import counted, percent
 from .late_imports import inputs, inspection, reports, samples, windows
 from .late_imports import operands as shapes
 from .options import (

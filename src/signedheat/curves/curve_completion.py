@@ -9,17 +9,16 @@ from typing import cast
 import numpy as np
 
 from ..arrays import Floats, Ints, mask_of
-from ..calls import public_call
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
 from ..errors import SourceError, UnsupportedTypeError
 from ..fields.field import Field
-from ..foreign import ForeignShape, as_list, converted
 from ..jobs import Progress
-from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..parallel import PointTree
+from ..shapes.foreign import ForeignShape, as_list, converted
+from ..shapes.kinds import SurfaceDomain
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given
@@ -27,7 +26,7 @@ from ..surfaces.surface import LinearDomain
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import flag
+from ..validation import flag, public_call
 from .curve_distance import distance_to_pieces, warn_of_gaps
 from .resolution import flattened, on_resolving_triangles
 from .stroke_directions import pieces_for_all

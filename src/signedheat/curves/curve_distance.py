@@ -11,17 +11,17 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from ..arrays import Bools, Ints
+from ..arrays import Bools, Ints, percent
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, warn_user
 from ..fields.field import Field
-from ..foreign import as_list
+from ..fields.sharpening import sharpen
 from ..jobs import Progress
-from ..kinds import AnySurface, SurfaceDomain
 from ..mesh.components import connected_components, grouped
 from ..mesh.welding import GAP_UNITS, SEAM_UNITS, joined_rims
-from ..sharpening import sharpen
+from ..shapes.foreign import as_list
+from ..shapes.kinds import AnySurface, SurfaceDomain
 from ..solver import SignedHeatSolver, distance_unwarned
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.repaired_mesh import RepairedMesh
@@ -29,7 +29,6 @@ from ..surfaces.source_segments import as_curves, given_curves, numbers_given, s
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag
-from ..words import percent
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, with_turned
 

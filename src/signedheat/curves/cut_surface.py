@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Frozen, Ints, mask_of
+from ..arrays import Bools, Floats, Frozen, Ints, counted, mask_of
 from ..errors import GeometryError
 from ..fields.field_domain import Exact
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs, split_corners
@@ -23,7 +23,6 @@ from ..surfaces.surface import LinearDomain, placed
 from ..surfaces.surface_curves import Curve
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import shaped
-from ..words import counted
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +152,8 @@ class CutSurface(LinearDomain, Frozen):
         Examples
         --------
         >>> import signedheat as sh
-        >>> torus = sh.samples.torus(24, 12)
-        >>> phi = sh.piecewise_distance(torus.path(range(24), closed=True), torus)
+        >>> torus = sh.samples.torus(n_around=48, n_across=24)
+        >>> phi = sh.piecewise_distance(torus.path(range(24), closed=True), torus)  # round the tube: bounds nothing
         >>> len(phi.domain.cuts(phi.values))
         1
         """

@@ -11,23 +11,23 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..area_elements import bounds_around
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, Note
 from ..errors import ConstraintError
 from ..fields.field import Field
 from ..fields.solid_queries import Closest
-from ..foreign import as_list
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.marching import values_at_walls
 from ..grids.polyline import Polyline
 from ..jobs import Progress, Stopwatch, within
-from ..kinds import Sources
 from ..mesh.components import connected_components, sums_of
 from ..mesh.polylines import FillRule, without_seams
 from ..mesh.unit_vectors import unit
 from ..search.face_tree import FaceTree
+from ..shapes.area_elements import bounds_around
+from ..shapes.foreign import as_list
+from ..shapes.kinds import Sources
 from ..solver import SignedHeatSolver
 from ..surfaces.extrapolation import Diffusion
 from ..surfaces.source_segments import NEARLY_CLOSED

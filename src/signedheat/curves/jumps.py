@@ -17,7 +17,6 @@ import numpy as np
 from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Ints, mask_of
-from ..curves.cut_surface import CutSurface
 from ..fields.field import Field
 from ..jobs import Progress
 from ..linear import factorize
@@ -27,6 +26,7 @@ from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, split_corners
 from ..mesh.polylines import assemble_polylines
 from ..surfaces.cotan import cotan_matrix, divergence
+from .cut_surface import CutSurface
 
 DUALITY_GAP, MOST_SPLITTING_ROUNDS = 2e-3, 3000
 """Relative gap between objective and bound at which minimisation ends, and the largest number of its rounds."""

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 from ..discretization import discretize
 from ..errors import CancellingNormalsError, GeometryError, SourceError
-from ..foreign import as_list
 from ..jobs import Progress, within
-from ..kinds import SurfaceDomain
+from ..shapes.foreign import as_list
+from ..shapes.kinds import SurfaceDomain
 from ..solver import SignedHeatSolver
 from ..surfaces.extrapolation import Diffusion
 from ..surfaces.intrinsic_discretization import Retriangulated, RetriangulatedForZeroSet

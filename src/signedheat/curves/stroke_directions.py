@@ -11,13 +11,13 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr, mask_of
 from ..errors import UnsupportedTypeError
-from ..foreign import ForeignShape, as_list, converted
-from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.signed_graph import best_signs
 from ..parallel import PointTree, in_threads
+from ..shapes.foreign import ForeignShape, as_list, converted
+from ..shapes.kinds import SurfaceDomain
 from ..solver import SignedHeatSolver
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others

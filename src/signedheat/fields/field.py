@@ -14,23 +14,22 @@ import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen
-from ..calls import public_call
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
-from ..exchange import Displayed, with_values
 from ..grids.band import Band
 from ..grids.grid import Grid
 from ..grids.polyline import Polyline
-from ..kinds import EmbeddedSurface
 from ..packages import lazy_module
+from ..shapes.exchange import Displayed, with_values
+from ..shapes.kinds import EmbeddedSurface
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.subdivision import common_subdivision
 from ..surfaces.surface import LinearDomain
 from ..surfaces.surface_curves import Curve, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from ..validation import array_of, finite_number, instance
+from ..validation import array_of, finite_number, instance, public_call
 from .field_domain import FieldDomain, Interpolant
 from .solid_queries import Closest, MakesFields, SolidQueries, scaled
 

@@ -8,8 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Ints
-from ..words import counted
+from ..arrays import Bools, Floats, Ints, counted
 
 
 @dataclass(frozen=True, eq=False)

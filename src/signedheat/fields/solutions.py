@@ -12,13 +12,12 @@ from scipy import sparse
 from ..arrays import Bools, Floats, mask_of
 from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
-from ..fields.field import Domain, Field
 from ..geodesics.exact_distance import shortest_arcs
 from ..grids.grid import Grid
 from ..grids.grid_discretization import GridDiscretization, GridSource
-from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..parallel import PointTree
+from ..shapes.kinds import SurfaceDomain
 from ..surfaces.plane_fits import POINT_NEIGHBORS
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.surface_discretization import SurfaceDiscretization
@@ -26,6 +25,7 @@ from ..surfaces.surface_source import SurfaceSource, joined
 from ..tets.tet_discretization import TetDiscretization
 from ..tets.tet_mesh import TetMesh
 from ..tets.tet_source import TetSource
+from .field import Domain, Field
 
 SMALL_LOOP = 3.5
 """Length of a loop, in side lengths of the triangles that it crosses, below which at least a quarter of its heat

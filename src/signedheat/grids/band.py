@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, counted
 from ..errors import GeometryError, OutsideError
 from ..fields.field_domain import Exact, FieldDomain
 from ..mesh.triangles import flipped_along_creases
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import array_of, instance
-from ..words import counted
 from .blocks import BLOCK, Blocks, BlockValues
 from .grid import Grid, GridInterpolant, other_nodes
 from .marching import contour_parts

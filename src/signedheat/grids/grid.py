@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, short
 from ..errors import GeometryError, MemoryLimitError
-from ..exchange import Displayed
 from ..fields.field_domain import Exact, FieldDomain, different
-from ..foreign import ForeignShape, Shape, as_shapes
 from ..mesh.triangles import flipped_along_creases
 from ..packages import lazy_module
 from ..parallel import in_chunks
+from ..shapes.exchange import Displayed
+from ..shapes.foreign import ForeignShape, Shape, as_shapes
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import (
     coordinates,

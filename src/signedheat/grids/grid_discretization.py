@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import lsqr
 
-from ..area_elements import AreaSamples, sample_on_grid
 from ..arrays import Floats, Ints
 from ..discretization import DiffusesEach, Levels, SolvesEach, discretize
 from ..errors import MemoryLimitError, SourceError
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..memory import REMEDY_MARGIN, available_memory, libraries, refuse_beyond_memory
+from ..shapes.area_elements import AreaSamples, sample_on_grid
 from .grid import Grid
 from .multilevel import Level, collapse, diffuse_multilevel, quotients, skip_finest, unit_vectors
 from .node_sources import NodeSources

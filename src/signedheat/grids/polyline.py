@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen
+from ..arrays import Floats, Frozen, counted
 from ..errors import GeometryError
-from ..exchange import Displayed
 from ..packages import lazy_module
+from ..shapes.exchange import Displayed
 from ..validation import boolean, coordinates, flag, numbers, positive_steps
-from ..words import counted
 from .marching import level_lines
 
 if TYPE_CHECKING:

@@ -19,19 +19,18 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Ints
-from ..calls import public_call
 from ..compiled import compiled
 from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..fields.field import Field
 from ..fields.solid_queries import Scaled
-from ..grids.band import Band
 from ..jobs import Progress, run_cancellable
+from ..methods import Method, Nearest, distance_to_nearest, nearest, sharpen_on, timed
 from ..packages import lazy_module
 from ..parallel import PointTree, in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
-from ..sharpening_methods import Method, Nearest, distance_to_nearest, nearest, sharpen_on, timed
-from ..validation import array_of, flag, numbers, positive_steps
+from ..validation import array_of, flag, numbers, positive_steps, public_call
+from .band import Band
 from .blocks import BLOCK
 from .grid import Grid
 from .nearest_nodes import Lattice, nearest_at_nodes

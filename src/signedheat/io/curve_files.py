@@ -10,11 +10,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints, mask_of
 from ..errors import FileFormatError, SignedHeatError, SourceError, UnsupportedTypeError
-from ..foreign import ForeignShape, converted
 from ..geodesics.shortest_paths import gaps
-from ..kinds import EmbeddedSurface
 from ..mesh.polylines import assemble_polylines
 from ..mesh.surface_points import locate_points, refuse_missing
+from ..shapes.foreign import ForeignShape, converted
+from ..shapes.kinds import EmbeddedSurface
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh

@@ -17,9 +17,9 @@ from ..arrays import Complexes, Floats
 from ..curves.drawings import FINEST_DRAWING
 from ..curves.outlines import distinct, outlines_filled
 from ..errors import FileFormatError, GeometryError
-from ..geometries import geometry_of, polylines_of
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
+from ..shapes.geometries import geometry_of, polylines_of
 from .budgets import XML, charge, charge_tree
 from .files import PathLike, contents, damaged, format_for, reading, replacing
 from .point_files import read_point_lists, write_point_lists

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import FileFormatError, GeometryError
-from ..exchange import VALUES_NAME, Elements
 from ..fields.field import Field
 from ..fields.solid_queries import Scaled, SolidQueries, scaled
-from ..foreign import SurfaceShape, elements, shape_of
 from ..grids.band import Band
 from ..grids.blocks import BLOCK, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
+from ..shapes.exchange import VALUES_NAME, Elements
+from ..shapes.foreign import SurfaceShape, elements, shape_of
 from ..solids.solid import Solid
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
-from ..transforms import Body, placed
+from ..shapes.transforms import Body, placed
 from .budgets import BYTES_PER_PLACED, JSON, charge, charge_tree
 from .files import PathLike, companion_contents, contents, damaged
 from .numerals import integer, integers

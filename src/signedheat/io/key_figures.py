@@ -10,11 +10,11 @@ import numpy as np
 
 from ..diagnostics import SampledSource
 from ..fields.field import Field
-from ..foreign import as_shape
 from ..grids.band import Band
 from ..grids.grid import Grid
-from ..inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..mesh.welding import indexed
+from ..shapes.foreign import as_shape
+from ..shapes.inspection import CloudReport, SurfaceReport, TetReport, inspect
 from ..solids.mesh_orientation import Orientation, orientation
 from ..solids.solid import Solid
 from ..solids.thickness import Widths, widths

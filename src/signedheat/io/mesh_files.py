@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError, InexactWarning, warn_user
-from ..exchange import Elements
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import distinct_rows, same_positions
+from ..shapes.exchange import Elements
 from ..surfaces.triangle_mesh import TriangleMesh
 from .budgets import charge_words
 from .files import PathLike, contents, damaged, reading, refuse_kind, text

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
-from ..exchange import Elements
+from ..shapes.exchange import Elements
 from .budgets import charge_words
 from .files import PathLike, contents, damaged, ensure_writable, replacing
 from .numerals import integer, integers, parsed_numbers

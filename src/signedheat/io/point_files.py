@@ -13,8 +13,8 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import FileFormatError
-from ..exchange import Elements
 from ..packages import ensure_installed
+from ..shapes.exchange import Elements
 from ..surfaces.point_cloud import PointCloud
 from .budgets import charge, charge_words
 from .files import PathLike, contents, damaged, extension, reading, refuse_kind, text

@@ -16,8 +16,8 @@ from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..mesh.welding import welded
 from ..packages import ensure_installed
+from ..shapes.transforms import Body, concatenated, placed
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import Body, concatenated, placed
 from . import gltf
 from .budgets import BYTES_PER_PLACED, XML, charge, charge_tree
 from .files import PathLike, contents, damaged, extension, reading

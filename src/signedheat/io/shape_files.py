@@ -7,19 +7,18 @@ from typing import cast
 
 import numpy as np
 
-from ..calls import public_call
 from ..errors import FileFormatError
-from ..exchange import Elements
-from ..foreign import ForeignShape, as_shape, elements, shape_of
 from ..grids.grid import Grid
-from ..kinds import Shape
 from ..memory import refuse_beyond_memory
+from ..shapes.exchange import Elements
+from ..shapes.foreign import ForeignShape, as_shape, elements, shape_of
+from ..shapes.kinds import Shape
 from ..solids.sample_set import Layout, Samples
 from ..solids.solid import Solid
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from ..validation import chosen
+from ..validation import chosen, public_call
 from .drawing_files import POLYLINE_FORMATS
 from .field_files import CONVENTION, read_field
 from .files import PathLike, ensure_writable, extension, format_for, reading, replacing

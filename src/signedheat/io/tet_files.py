@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import FileFormatError
-from ..exchange import FLAT_CELLS, VALUES_NAME
 from ..packages import require
+from ..shapes.exchange import FLAT_CELLS, VALUES_NAME
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh

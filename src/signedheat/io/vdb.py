@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import FileFormatError
-from ..exchange import VALUES_NAME
 from ..fields.field import Field
 from ..grids.band import Band
 from ..grids.blocks import BLOCK, Blocks
 from ..grids.grid import Grid
+from ..shapes.exchange import VALUES_NAME
 from .files import PathLike, format_for, replacing
 
 VDB_MAGIC, VDB_VERSION, VDB_LIBRARY = 0x56444220, 224, (10, 0)

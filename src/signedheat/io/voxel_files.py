@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Frozen, read_only, short
 from ..errors import FileFormatError, GeometryError
-from ..exchange import VALUES_NAME
 from ..fields.field import Field
-from ..foreign import Represented
 from ..grids.grid import Grid
 from ..packages import require
+from ..shapes.exchange import VALUES_NAME
+from ..shapes.foreign import Represented
+from ..shapes.transforms import transform
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import transform
 from ..validation import array_of, numbers
 from .budgets import charge
 from .field_files import CONVENTION, ensure_field_writable, made, save_field

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
-from ..exchange import Elements
+from ..shapes.exchange import Elements
 from .budgets import BYTES_PER_PLACED, XML, charge, charge_tree, charge_words
 from .files import PathLike, contents, damaged
 from .numerals import integer, integers, parsed_numbers

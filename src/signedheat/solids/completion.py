@@ -13,13 +13,10 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..calls import public_call
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note
 from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
-from ..foreign import SurfaceShape
 from ..jobs import Progress, Stopwatch
-from ..kinds import ShapeLike
 from ..linear.threads import one_blas_thread
 from ..memory import refuse_beyond_memory
 from ..mesh.arrangement import SAME_POINT
@@ -29,10 +26,12 @@ from ..mesh.unit_vectors import axes_across
 from ..mesh.welding import indexed, tolerances
 from ..parallel import PointTree
 from ..search.face_tree import FaceTree
+from ..shapes.foreign import SurfaceShape
+from ..shapes.kinds import ShapeLike
+from ..shapes.transforms import joined_shape
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import joined_shape
-from ..validation import chosen, flag
+from ..validation import chosen, flag, public_call
 from .bodies import whole_boundary
 from .bounding import Bounding, bounding
 from .chain import Chain

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints, mask_of
+from ..arrays import Bools, Floats, Ints, mask_of, percent
 from ..diagnostics import SMALL_SHARE
 from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
@@ -42,7 +42,6 @@ from ..mesh.self_intersections import self_intersections
 from ..mesh.triangles import MOST_CREASED_FACES, bent_edges, divided_at
 from ..parallel import PointTree, in_threads
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..words import percent
 from .gauss import Pieces, sampled
 from .offsets import Offset
 from .tiles import blocks_where, prepared, solved, tiles_of

@@ -10,22 +10,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints
-from ..calls import public_call
+from ..arrays import Bools, Floats, Frozen, Ints, counted
 from ..errors import SourceError
-from ..foreign import SurfaceShape, as_shape, what_to_pass
 from ..jobs import Progress
-from ..kinds import ShapeLike
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
 from ..search.face_tree import EQUALLY_NEAR, FaceFeatures, FaceTree, NearestFaces
+from ..shapes.foreign import SurfaceShape, as_shape, what_to_pass
+from ..shapes.kinds import ShapeLike
+from ..shapes.transforms import joined_shape
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from ..transforms import joined_shape
-from ..validation import finite_number, percentages
-from ..words import counted
+from ..validation import finite_number, percentages, public_call
 from .completion import complete
 from .mesh_orientation import agreeing_faces, owners_of
 from .solid import Solid

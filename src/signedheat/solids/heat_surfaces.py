@@ -13,7 +13,6 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from ..area_elements import AreaSamples, sample_on_grid
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..constraints import Constraint, ZeroSet
@@ -26,6 +25,7 @@ from ..grids.stencil import solve_poisson
 from ..mesh.components import sums_of
 from ..method import diffuse, integrate, normalize
 from ..parallel import in_threads
+from ..shapes.area_elements import AreaSamples, sample_on_grid
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from .point_orientation import fitted_to_points

@@ -10,16 +10,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Ints
-from ..calls import public_call
 from ..errors import GeometryError, SourceError
-from ..foreign import ForeignShape, converted
 from ..mesh.components import element_components
 from ..mesh.edges import edge_table
 from ..mesh.triangles import side_lengths
 from ..mesh.welding import same_positions
+from ..shapes.foreign import ForeignShape, converted
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import element_ids, positive_number
+from ..validation import element_ids, positive_number, public_call
 from .bounding import Bounding, bounding
 from .chain import Chain
 from .closing import NO_EDGES, closed_by

@@ -9,8 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats
-from ..calls import public_call
+from ..arrays import Bools, Floats, counted
 from ..errors import GeometryError, OutsideError, SignedHeatError
 from ..grids.exact_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
@@ -18,8 +17,7 @@ from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import array_of, finite_number, flag, positive_steps, refuse_beside, whole_number
-from ..words import counted
+from ..validation import array_of, finite_number, flag, positive_steps, public_call, refuse_beside, whole_number
 from .contouring import crossed_between, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]

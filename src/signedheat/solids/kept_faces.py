@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, counted
 from ..errors import GeometryError
 from ..grids.grid import RESOLUTION, Grid
 from ..jobs import Progress
@@ -23,7 +23,6 @@ from ..mesh.triangles import part_volumes
 from ..mesh.welding import indexed, tolerances
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..words import counted
 from .bodies import crossing_faces, whole_boundary, without_doubles
 from .contouring import sharp_surface
 from .offsets import Offset

@@ -10,17 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Frozen, Ints, ShortRepr
-from ..calls import public_call
 from ..curves.stroke_directions import CurveOrientation, curve_orientation
 from ..diagnostics import ShapeOriented
 from ..errors import GeometryError
-from ..foreign import ForeignShape, converted
-from ..kinds import SurfaceDomain
 from ..mesh.components import first_members
+from ..shapes.foreign import ForeignShape, converted
+from ..shapes.kinds import SurfaceDomain
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import chosen
+from ..validation import chosen, public_call
 from .bounding import Bounding, bounding
 from .chain import Chain
 from .overlaps import Nesting

@@ -9,21 +9,20 @@ from typing import Literal, TypeAlias, cast
 
 import numpy as np
 
-from ..area_elements import area_elements
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, counted
 from ..compiled import compiled
 from ..errors import SignedHeatError, SourceError
-from ..foreign import as_list
 from ..grids.grid import Grid
-from ..kinds import Shapes
 from ..mesh.box_tree import BOXES_PER_LEAF
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import indexed
 from ..parallel import in_chunks
 from ..search.face_tree import FaceFeatures, FaceTree, NearestFaces
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
+from ..shapes.area_elements import area_elements
+from ..shapes.foreign import as_list
+from ..shapes.kinds import Shapes
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..words import counted
 from .mesh_orientation import agreeing_faces
 from .tiles import Evaluated
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, counted
 from ..packages import lazy_module
-from ..words import counted
 
 files: Any = lazy_module("signedheat.io.shape_files", "files")
 

@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..calls import public_call
 from ..errors import OutsideError, SignedHeatError, SourceError
 from ..fields.field import Field
 from ..grids.grid import Grid
-from ..kinds import Shapes
 from ..memory import refuse_beyond_memory
 from ..mesh.triangles import bent_edges, face_areas
 from ..mesh.unit_vectors import unit
+from ..shapes.kinds import Shapes
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import finite_number, whole_number
+from ..validation import finite_number, public_call, whole_number
 from .completion import complete
 from .sample_set import NOISE_WIDTHS, Samples
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, Ints
+from ..arrays import Floats, Frozen, Ints, counted
 from ..errors import GeometryError
 from ..grids.polyline import Polyline
 from ..mesh.components import numbered
@@ -20,7 +20,6 @@ from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from ..mesh.welding import indexed
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import numbers, refuse_extreme
-from ..words import counted
 
 PLANE_ROUNDING = 16.0
 """Distance from a plane up to which a vertex lies in it, in last places of the largest coordinate: what rounding of

@@ -11,14 +11,11 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints, short
-from ..calls import public_call, refuse_uncallable
+from ..arrays import Bools, Floats, Frozen, Ints, counted, percent, short
 from ..diagnostics import CompletedArea, Diagnostics, Note
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
-from ..exchange import Displayed
 from ..fields.field import Field
 from ..fields.solid_queries import Closest
-from ..foreign import Represented
 from ..grids.band import Band
 from ..grids.grid import RESOLUTION, Grid
 from ..jobs import Progress
@@ -29,10 +26,20 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import weights_in
+from ..shapes.exchange import Displayed
+from ..shapes.foreign import Represented
+from ..shapes.transforms import transformed
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import transformed
-from ..validation import finite_number, flag, positive_number, query_points, refuse_beside, shaped
-from ..words import counted, percent
+from ..validation import (
+    finite_number,
+    flag,
+    positive_number,
+    public_call,
+    query_points,
+    refuse_beside,
+    refuse_uncallable,
+    shaped,
+)
 from .contouring import announce_lost, sharp_surface
 from .kept_faces import kept_surface
 from .offsets import Offset, Reach

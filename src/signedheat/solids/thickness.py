@@ -16,11 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, Ints
-from ..calls import public_call
+from ..arrays import Floats, Frozen, Ints, counted
 from ..compiled import compiled
 from ..errors import SourceError
-from ..kinds import ShapeLike
 from ..memory import refuse_beyond_memory
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.components import connected_components, sums_of
@@ -32,10 +30,10 @@ from ..packages import lazy_module
 from ..parallel import in_chunks
 from ..search.face_tree import FaceTree
 from ..search.nearest_triangles import foot_on_triangle, weights_in
+from ..shapes.kinds import ShapeLike
 from ..surfaces.local_triangulations import OPPOSITE_SIDES
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import percentages, positive_number, whole_number
-from ..words import counted
+from ..validation import percentages, positive_number, public_call, whole_number
 from .completion import complete
 from .mesh_orientation import Mesh
 from .sampling import evenly_on

@@ -23,8 +23,8 @@ from ..mesh.self_intersections import overlapping_faces
 from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
 from ..parallel import PointTree
+from ..shapes.transforms import concatenated
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..transforms import concatenated
 from .bodies import same_solid
 from .regions import cut_and_sided
 from .sections import Plane

@@ -7,13 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Frozen
+from ..arrays import Bools, Floats, Frozen, counted
 from ..errors import GeometryError
 from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
 from ..search.face_tree import NearestFaces
 from ..search.winding_tree import OFF_FACE, WindingTree, steps_off, winding_sums
-from ..words import counted
 
 INSIDE_WINDING = 0.5
 """Winding number above which a point is inside; exact winding numbers are integers."""

@@ -23,11 +23,11 @@ from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
-from ..exchange import Displayed
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.components import sums_of
 from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, separate_triangles
 from ..mesh.edges import EdgeTable
+from ..shapes.exchange import Displayed
 from ..validation import array_of, finite_number, frozen, numbers, positive_steps, refuse_extreme, refuse_lost_spacing
 from .polygon_mesh import PolygonMesh
 from .surface import Surface

@@ -17,20 +17,18 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats, Frozen, Ints
-from ..calls import public_call
+from ..arrays import Bools, Floats, Frozen, Ints, counted
 from ..errors import GeometryError
-from ..exchange import Displayed
 from ..fields.field_domain import Exact
-from ..foreign import ForeignShape, converted
 from ..jobs import Progress, Stopwatch, within
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import N_STEPS, flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
-from ..validation import finite_rows, flag, frozen, shaped, whole_numbers
-from ..words import counted
+from ..shapes.exchange import Displayed
+from ..shapes.foreign import ForeignShape, converted
+from ..validation import finite_rows, flag, frozen, public_call, shaped, whole_numbers
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments

@@ -19,17 +19,16 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, counted, percent
 from ..compiled import compiled
 from ..errors import GeometryError, InexactWarning, warn_user
-from ..exchange import Elements, Exchangeable
 from ..jobs import interruptible
 from ..mesh.signed_graph import Links, signs_of
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import same_rows
 from ..parallel import PointTree
+from ..shapes.exchange import Elements, Exchangeable
 from ..validation import coordinates, finite_rows, frozen, numbers, whole_number
-from ..words import counted, percent
 from .local_triangulations import SAME_SIDE_HEIGHT, LocalTriangulations, local_triangulations, opposed_normals
 from .plane_fits import (
     CLEAN_NEIGHBORS,

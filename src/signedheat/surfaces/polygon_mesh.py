@@ -17,13 +17,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Ints, mask_of
+from ..arrays import Bools, Floats, Ints, counted, mask_of
 from ..errors import GeometryError
-from ..exchange import Elements, Exchangeable
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.triangles import area_vectors, cut_into_ears
+from ..shapes.exchange import Elements, Exchangeable
 from ..validation import array_of, coordinates, from_zero, frozen, used_bounds, whole_numbers
-from ..words import counted
 from .surface import Surface, check_mask
 from .triangle_mesh import TriangleMesh
 

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from ..arrays import Floats, Ints
-from ..calls import public_call
 from ..errors import GeometryError
 from ..mesh.components import first_members
 from ..mesh.surface_points import EDGE, VERTEX, LocatedPoints, locate_points
+from ..validation import public_call
 from .intrinsic_history import misplaced_lines
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .polygon_mesh import PolygonMesh

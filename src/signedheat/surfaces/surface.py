@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
-from ..calls import public_call
 from ..errors import OutsideError, SourceError
 from ..fields.field_domain import Exact, FieldDomain
 from ..geodesics.shortest_paths import join
@@ -28,7 +27,7 @@ from ..mesh.surface_points import (
 from ..mesh.triangles import Triangles, area_vectors, gradients_along
 from ..packages import lazy_module
 from ..search.nearest_triangles import TriangleTree
-from ..validation import array_of, coordinates, finite_number, flag, numbers, query_points, shaped
+from ..validation import array_of, coordinates, finite_number, flag, numbers, public_call, query_points, shaped
 from .surface_curves import Curve, CurveOrPoints, SurfacePoints
 
 surface_paths: Any = lazy_module("signedheat.surfaces.surface_paths", "shortest paths")

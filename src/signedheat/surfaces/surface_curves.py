@@ -9,10 +9,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, Ints
+from ..arrays import Floats, Frozen, Ints, counted
 from ..errors import SourceError
 from ..validation import array_of, finite_rows, flag, frozen, whole_numbers
-from ..words import counted
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,10 +13,10 @@ from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Ints, LastUsed, fingerprint, mask_of
 from ..diagnostics import EdgesLengthened, LargeAngles, Note, PointsLeftOut, VerticesAdded, VerticesJoined
-from ..direct_integration import DirectIntegration, SpringIntegration, refuse_contradictions
 from ..discretization import Levels, SourceTerm, discretize
 from ..errors import GeometryError
 from ..linear import Factor, chosen_backend, elimination_order, factorize
+from ..linear.direct_integration import DirectIntegration, SpringIntegration, refuse_contradictions
 from ..memory import refuse_beyond_memory
 from ..mesh.conforming_refinement import refine_to_conform
 from ..mesh.curve_segments import CurveSegments

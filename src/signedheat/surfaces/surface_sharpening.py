@@ -11,26 +11,25 @@ from itertools import chain
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints, mask_of
+from ..arrays import Bools, Floats, Ints, mask_of, percent
 from ..diagnostics import GeodesicWindows, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from ..fields.field import Field
-from ..foreign import as_list
 from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares, zero_line
 from ..jobs import Progress
-from ..kinds import SurfaceDomain
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, VERTEX, incident_faces
+from ..methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
 from ..search.face_tree import EQUALLY_NEAR
-from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
-from ..surfaces.surface import Surface
-from ..words import percent
+from ..shapes.foreign import as_list
+from ..shapes.kinds import SurfaceDomain
 from .intrinsic_triangulation import IntrinsicTriangulation
 from .source_segments import given_curves
+from .surface import Surface
 from .surface_curves import CurvesAndPoints
 from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource, lie_along

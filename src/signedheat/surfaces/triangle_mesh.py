@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, counted
 from ..errors import GeometryError
-from ..exchange import Elements, Exchangeable
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
 from ..mesh.triangles import area_vectors
 from ..mesh.welding import ONE_PLACE, SEAM_UNITS, joined_rims
 from ..search.nearest_triangles import TriangleTree
+from ..shapes.exchange import Elements, Exchangeable
 from ..validation import coordinates, element_ids, used_bounds
-from ..words import counted
 from .surface import Surface
 
 if TYPE_CHECKING:

@@ -17,18 +17,17 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..area_elements import area_elements, bounds_around
 from ..arrays import Bools, Floats, Ints
-from ..calls import public_call
 from ..errors import GeometryError, MemoryLimitError
-from ..foreign import converted
 from ..grids.grid import room_around
-from ..kinds import Shape, ShapeLike
 from ..memory import refuse_beyond_memory
 from ..mesh.components import places_among
 from ..parallel import PointTree
+from ..shapes.area_elements import area_elements, bounds_around
+from ..shapes.foreign import converted
+from ..shapes.kinds import Shape, ShapeLike
 from ..surfaces.point_cloud import PointCloud
-from ..validation import finite_number, refuse_extreme
+from ..validation import finite_number, public_call, refuse_extreme
 from .tet_mesh import TetMesh
 
 FINEST_LATTICE = 1e9

@@ -12,9 +12,9 @@ import scipy
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Ints, LastUsed
-from ..direct_integration import STIFFEST_SPRING, SpringIntegration
 from ..discretization import DiffusesEach, Levels, SourceTerm, discretize
 from ..linear import Factor, factorize, upper_triangle
+from ..linear.direct_integration import STIFFEST_SPRING, SpringIntegration
 from ..linear.incomplete_cholesky import IncompleteCholesky, from_first, outward_order
 from ..linear.restarts import Stage, matrix_forces, solve_with_restarts
 from ..memory import refuse_beyond_memory

@@ -11,17 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats, Frozen, Ints
+from ..arrays import Floats, Frozen, Ints, counted
 from ..errors import GeometryError
-from ..exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
 from ..fields.field_domain import Exact, FieldDomain
 from ..mesh.components import element_components
 from ..mesh.tet_shapes import FaceTable, Tetrahedra, signed_volumes
 from ..packages import lazy_module
 from ..search.nearest_triangles import TriangleTree
+from ..shapes.exchange import Displayed, shapes, tets_of_meshio, tets_of_pyvista
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import coordinates, element_ids, frozen, query_points, shaped, used_bounds
-from ..words import counted
 from .tet_clipping import Planes, barycentric, containing_tets
 from .tet_levels import closed_level_set
 

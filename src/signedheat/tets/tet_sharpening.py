@@ -21,20 +21,20 @@ from ..diagnostics import Note, RoundCorners, SharpenedToShape
 from ..discretization import SourceTerm
 from ..errors import SourceError
 from ..fields.field import Field
-from ..foreign import SurfaceShape, as_shapes
 from ..geodesics.heap_kernels import Queue, pop, push
 from ..jobs import Progress, run_cancellable
-from ..kinds import Shapes
 from ..mesh.components import grouped
+from ..methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..search.nearest_triangles import TriangleTree, foot_on_triangle
-from ..sharpening_methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
+from ..shapes.foreign import SurfaceShape, as_shapes
+from ..shapes.kinds import Shapes
+from ..shapes.transforms import joined_triangles
 from ..surfaces.point_cloud import PointCloud
-from ..tets.tet_mesh import TetMesh
-from ..transforms import joined_triangles
 from .tet_clipping import SIGHT_OUTSIDE, Planes, barycentric, beyond, stays_inside
 from .tet_discretization import TetDiscretization, lowered_tets
 from .tet_levels import level_triangles
+from .tet_mesh import TetMesh
 
 FACE_EDGES = 2.0
 """Distance from a face, in mean edges, within which its side decides the sign, and beyond which from all faces the zero

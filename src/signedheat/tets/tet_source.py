@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..area_elements import AreaElements, area_elements
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..diagnostics import Note, OutsideMesh
 from ..errors import SourceError
 from ..mesh.components import sums_of
 from ..mesh.unit_vectors import unit
+from ..shapes.area_elements import AreaElements, area_elements
 from .tet_clipping import ClippedPolygons, Planes, barycentric, clip_triangles, containing_tets
 from .tet_mesh import TetMesh
 

@@ -14,12 +14,12 @@ import numpy as np
 from ..curves.cut_surface import CutSurface
 from ..errors import GeometryError, MissingPackageError, UnsupportedTypeError
 from ..fields.field import Field
-from ..foreign import converted
 from ..grids.grid import Grid
 from ..grids.polyline import Polyline
 from ..io.files import PathLike
-from ..kinds import Shape
 from ..packages import lazy_module
+from ..shapes.foreign import converted
+from ..shapes.kinds import Shape
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh

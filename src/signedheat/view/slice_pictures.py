@@ -17,8 +17,8 @@ from ..grids.grid import Grid
 from ..grids.marching import level_lines
 from ..grids.polyline import Polyline
 from ..io.files import PathLike
-from ..kinds import SpaceSources
 from ..packages import lazy_module
+from ..shapes.kinds import SpaceSources
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..curves.cut_surface import CutSurface
-from ..exchange import Elements
 from ..fields.field import Field
-from ..foreign import ForeignShape, as_shape, elements
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.numpy_files import write_npz
 from ..io.ply import write_ply
-from ..kinds import Shape
+from ..shapes.exchange import Elements
+from ..shapes.foreign import ForeignShape, as_shape, elements
+from ..shapes.kinds import Shape
 from ..solids.deviations import HISTOGRAM_BINS, Deviation
 from ..solids.thickness import Thickness
 from ..surfaces.digital_surface import DigitalSurface

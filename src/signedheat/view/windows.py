@@ -7,11 +7,11 @@ from functools import singledispatch
 from typing import Any
 
 from ..errors import GeometryError, OutsideError
-from ..exchange import VALUES_NAME
 from ..fields.field import Field
 from ..grids.grid import Grid
 from ..grids.polyline import Polyline
 from ..packages import lazy_module
+from ..shapes.exchange import VALUES_NAME
 from ..tets.tet_mesh import TetMesh
 from .figures import even_colors, isolines_between, range_of
 from .surface_pictures import INNER_COLOR, OUTER_COLOR

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Floats, Ints, mask_of, read_only
+from ..arrays import Floats, Ints, mask_of, read_only
+from ..mesh.components import connected_components
+from ..mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
+from ..mesh.tet_shapes import FLAT_TET
+from ..mesh.triangles import areas_of_polygons
+from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
+from ..validation import used_bounds
 from .foreign import Shape
-from .mesh.components import connected_components
-from .mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
-from .mesh.tet_shapes import FLAT_TET
-from .mesh.triangles import areas_of_polygons
-from .mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
-from .surfaces.digital_surface import DigitalSurface
-from .surfaces.point_cloud import PointCloud
-from .surfaces.polygon_mesh import PolygonMesh
-from .surfaces.triangle_mesh import TriangleMesh
-from .tets.tet_mesh import TetMesh
-from .validation import used_bounds
 
 
 @dataclass(frozen=True)

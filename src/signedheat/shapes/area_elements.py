@@ -15,23 +15,23 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Floats, Ints
-from .errors import CancellingNormalsError, SourceError
+from ..arrays import Floats, Ints
+from ..errors import CancellingNormalsError, SourceError
+from ..grids.grid import Grid
+from ..grids.node_sources import NodeSources, merge_in_cells
+from ..grids.polyline import Polyline
+from ..grids.stencil import padded_shape
+from ..mesh.components import element_components
+from ..mesh.triangles import AREA_ROUNDING, area_vectors
+from ..mesh.unit_vectors import unit
+from ..mesh.welding import same_positions
+from ..parallel import PointTree
+from ..surfaces.plane_fits import POINT_NEIGHBORS
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
 from .foreign import what_to_pass
-from .grids.grid import Grid
-from .grids.node_sources import NodeSources, merge_in_cells
-from .grids.polyline import Polyline
-from .grids.stencil import padded_shape
-from .mesh.components import element_components
-from .mesh.triangles import AREA_ROUNDING, area_vectors
-from .mesh.unit_vectors import unit
-from .mesh.welding import same_positions
-from .parallel import PointTree
-from .surfaces.plane_fits import POINT_NEIGHBORS
-from .surfaces.point_cloud import PointCloud
-from .surfaces.polygon_mesh import PolygonMesh
-from .surfaces.triangle_mesh import TriangleMesh
-from .tets.tet_mesh import TetMesh
 
 
 @dataclass(frozen=True, eq=False)

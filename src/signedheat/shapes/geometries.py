@@ -8,9 +8,9 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from .errors import GeometryError, UnsupportedTypeError
-from .grids.polyline import Polyline
-from .packages import lazy_module
+from ..errors import GeometryError, UnsupportedTypeError
+from ..grids.polyline import Polyline
+from ..packages import lazy_module
 
 shapely: Any = lazy_module("shapely", "geometries of shapely")
 

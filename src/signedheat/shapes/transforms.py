@@ -9,19 +9,18 @@ from typing import TypeAlias, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Floats, Ints
-from .calls import public_call
-from .errors import GeometryError, SourceError, UnsupportedTypeError
+from ..arrays import Floats, Ints
+from ..errors import GeometryError, SourceError, UnsupportedTypeError
+from ..grids.polyline import Polyline
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.surface_curves import Curve, SurfacePoints
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
+from ..validation import LARGEST_COORDINATE, SMALLEST_EXTENT, numbers, public_call
 from .foreign import ForeignShape, Represented, SurfaceShape, as_shape, as_shapes, converted, refuse_arrays
-from .grids.polyline import Polyline
 from .kinds import ShapeLike
-from .surfaces.digital_surface import DigitalSurface
-from .surfaces.point_cloud import PointCloud
-from .surfaces.polygon_mesh import PolygonMesh
-from .surfaces.surface_curves import Curve, SurfacePoints
-from .surfaces.triangle_mesh import TriangleMesh
-from .tets.tet_mesh import TetMesh
-from .validation import LARGEST_COORDINATE, SMALLEST_EXTENT, numbers
 
 
 @public_call

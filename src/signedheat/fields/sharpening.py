@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import TypeVar, overload
 
-from .calls import public_call
-from .fields.field import Field
-from .grids import redistancing  # noqa: F401  registers how its fields are sharpened
-from .grids.grid import Dimension, Grid
-from .jobs import Progress
-from .kinds import Shapes, SurfaceDomain
-from .sharpening_methods import Method, sharpen_on
-from .surfaces import surface_sharpening  # noqa: F401  registers how its fields are sharpened
-from .surfaces.surface_curves import CurvesAndPoints
-from .tets import tet_sharpening  # noqa: F401  registers how its fields are sharpened
-from .tets.tet_mesh import TetMesh
+from ..grids import redistancing  # noqa: F401  registers how its fields are sharpened
+from ..grids.grid import Dimension, Grid
+from ..jobs import Progress
+from ..methods import Method, sharpen_on
+from ..shapes.kinds import Shapes, SurfaceDomain
+from ..surfaces import surface_sharpening  # noqa: F401  registers how its fields are sharpened
+from ..surfaces.surface_curves import CurvesAndPoints
+from ..tets import tet_sharpening  # noqa: F401  registers how its fields are sharpened
+from ..tets.tet_mesh import TetMesh
+from ..validation import public_call
+from .field import Field
 
 OnSurface = TypeVar("OnSurface", bound=SurfaceDomain)
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from .arrays import Floats, Frozen, Ints, LastUsed, fingerprint
-from .discretization import Levels, SourceTerm
-from .errors import ConstraintError
-from .linear import Factor, PardisoFactor, factorize, upper_triangle, whole
-from .linear.conjugate_gradients import conjugate_gradients
+from ..arrays import Floats, Frozen, Ints, LastUsed, fingerprint
+from ..discretization import Levels, SourceTerm
+from ..errors import ConstraintError
+from . import Factor, PardisoFactor, factorize, upper_triangle, whole
+from .conjugate_gradients import conjugate_gradients
 
 STIFFEST_SPRING = 1e10
 """Strength of springs, relative to C, above which, and below whose inverse, it makes no difference beyond rounding."""

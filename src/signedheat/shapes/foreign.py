@@ -12,15 +12,15 @@ from typing import Protocol, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .calls import is_pair, like_array, public_call
-from .errors import SourceError, UnsupportedTypeError
+from ..errors import SourceError, UnsupportedTypeError
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
+from ..validation import is_pair, like_array, public_call
 from .exchange import ACCEPTED_SHAPES, ELEMENTS_OF, Elements
 from .geometries import geometry_of, polylines_of
-from .surfaces.digital_surface import DigitalSurface
-from .surfaces.point_cloud import PointCloud
-from .surfaces.polygon_mesh import PolygonMesh
-from .surfaces.triangle_mesh import TriangleMesh
-from .tets.tet_mesh import TetMesh
 
 One = TypeVar("One")
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias, TypeVar
 
+from ..grids.grid import Grid
+from ..grids.polyline import Polyline
+from ..surfaces.digital_surface import DigitalSurface
+from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
+from ..surfaces.surface_curves import CurveOrPoints
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..tets.tet_mesh import TetMesh
 from .foreign import ForeignShape
 from .foreign import Shape as Shape
 from .geometries import HasGeoInterface
-from .grids.grid import Grid
-from .grids.polyline import Polyline
-from .surfaces.digital_surface import DigitalSurface
-from .surfaces.intrinsic_triangulation import IntrinsicTriangulation
-from .surfaces.point_cloud import PointCloud
-from .surfaces.polygon_mesh import PolygonMesh
-from .surfaces.surface_curves import CurveOrPoints
-from .surfaces.triangle_mesh import TriangleMesh
-from .tets.tet_mesh import TetMesh
 
 EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
 """Surfaces with positions in space, on which curves and points can lie."""

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Ints
-from .errors import GeometryError, UnsupportedTypeError
-from .mesh.components import members_of
-from .mesh.tet_shapes import face_table, signed_volumes
-from .packages import lazy_module
-from .validation import array_of, coordinates, element_ids
+from ..arrays import Ints
+from ..errors import GeometryError, UnsupportedTypeError
+from ..mesh.components import members_of
+from ..mesh.tet_shapes import face_table, signed_volumes
+from ..packages import lazy_module
+from ..validation import array_of, coordinates, element_ids
 
 ACCEPTED_SHAPES = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
 """What functions accept as a shape, in the words of error messages."""

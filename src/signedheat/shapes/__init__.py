@@ -1,0 +1,1 @@
+"""Shapes from anywhere: what is taken for one, conversion, motion, area elements, inspection."""
