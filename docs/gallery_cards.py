@@ -12,7 +12,7 @@ from PIL import Image, ImageOps
 
 TRADES = {
     "Repair and printing": (
-        "watertight_scan filled_holes offset_of_a_broken_sphere overlapping_bodies turned_faces print_shell "
+        "watertight_scan made_solid filled_holes offset_of_a_broken_sphere overlapping_bodies turned_faces print_shell "
         "hollow_model sections_and_cuts wall_thickness thin_plates open_sheets sharp_contours grow_and_shrink"
     ),
     "Distance for learning": "deepsdf_set fit_to_distances booleans_of_fields smooth_blends fine_band",

@@ -38,6 +38,7 @@ EXPECTED = {
     "grow_and_shrink": (-0.1, 0.01),
     "hollow_model": (1.0, 0.08),
     "intrinsic_triangles": (20.0, 11.0),
+    "made_solid": (1.0, 0.01),
     "mask_and_back": (1.0, 0.0),
     "offset_of_a_broken_sphere": (1.2, 0.01),
     "open_sheets": (1.0, 0.0),

@@ -140,3 +140,16 @@ def test_one_label_of_an_image(tmp_path, capsys):
     assert bounds[1] - bounds[0] == pytest.approx([2, 2, 2], abs=0.1)
     assert main(command) == 1
     assert "label" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_openings_are_sealed(tmp_path, capsys):
+    """A ball with two skins and a hole in both is one body."""
+    skins = samples.union(samples.sphere(4), samples.sphere(4, radius=0.9))
+    centres = skins.vertices[skins.faces].mean(axis=1)
+    sh.TriangleMesh(skins.vertices, skins.faces[centres[:, 2] < 0.88]).save(tmp_path / "skins.ply")
+    command = ["watertight", str(tmp_path / "skins.ply"), "-o", str(tmp_path / "solid.ply"), "--workers", "1"]
+    assert main([*command, "--seal", "1.5", "--json"]) == 0
+    (shape,) = json.loads(capsys.readouterr().out)["shapes"]
+    assert shape["bodies"] == 1 and shape["volume"] == pytest.approx(4 / 3 * np.pi, rel=0.02)
+    assert_closed_manifold(sh.read(tmp_path / "solid.ply"))

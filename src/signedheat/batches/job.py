@@ -284,6 +284,8 @@ class Watertight:
         Simplify the surface, by no more than this distance.
     resolution, spacing
         Contour the whole surface on this grid, as `Solid.surface` does; 256 nodes along the longest side by default.
+    seal : float, optional
+        Seal openings narrower than this length, and fill what lies behind them, as `complete` does.
     samples : int, optional
         Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
         positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
@@ -318,6 +320,7 @@ class Watertight:
     tolerance: float | None = None
     resolution: int | None = None
     spacing: float | None = None
+    seal: float | None = None
     samples: int | None = None
     normalize: bool = False
     label: float | None = None
@@ -330,6 +333,8 @@ class Watertight:
             positive_number(self.thickness, "thickness")
         if self.tolerance is not None:
             positive_number(self.tolerance, "tolerance")
+        if self.seal is not None:
+            positive_number(self.seal, "seal")
         for unit in (self.units or "m").split(":"):
             if unit not in METRES:
                 raise SignedHeatError(f"{unit!r} is not a unit", element="units", remedy=f"use {', '.join(METRES)}")
@@ -344,7 +349,8 @@ class Watertight:
         else:
             shape = read(path)
         scale = 1.0 if self.units is None else scale_to(path, self.units)
-        solid = complete(shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0])))
+        placed = shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0]))
+        solid = complete(placed, seal=self.seal)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", InexactWarning)
             surface, way = self._closed_surface(solid)

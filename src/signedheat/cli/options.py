@@ -53,6 +53,8 @@ COMMANDS_OF_OTHERS = {
     "heal": "watertight",
     "hollow": "morph",
     "intersection": "intersect",
+    "make-solid": "watertight",
+    "wrap": "watertight",
     "isosurface": "contour",
     "manifold": "watertight",
     "plot": "view",

@@ -30,8 +30,9 @@ from ..shapes.foreign import SurfaceShape
 from ..shapes.kinds import ShapeLike
 from ..shapes.transforms import joined_shape
 from ..surfaces.point_cloud import PointCloud
+from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import chosen, flag, public_call
+from ..validation import chosen, flag, positive_number, public_call
 from .bodies import whole_boundary
 from .bounding import Bounding, bounding
 from .chain import Chain
@@ -42,6 +43,7 @@ from .overlaps import Nesting
 from .point_orientation import mean_gap, orient_points, without_strays
 from .regions import TOLERANCES
 from .rims import boundary, divided_at_rims, loops
+from .sealing import sealed
 from .solid import Solid
 from .union import TriangleGroup, united
 from .winding import Windings
@@ -113,12 +115,15 @@ class Completion:
     nested: Nesting = "given"
     as_oriented: bool = False
     keep_overlaps: bool = False
+    seal: float | None = None
 
     def __post_init__(self) -> None:
         for name, choices in (("completion", Completing), ("lids", Lids), ("nested", Nesting)):
             chosen(getattr(self, name), choices, name)
         for name in ("as_oriented", "keep_overlaps"):
             flag(getattr(self, name), name)
+        if self.seal is not None:
+            positive_number(self.seal, "seal")
 
 
 @public_call
@@ -130,6 +135,7 @@ def complete(
     as_oriented: bool = False,
     keep_overlaps: bool = False,
     nested: Nesting = "given",
+    seal: float | None = None,
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     progress: Progress | None = None,
@@ -159,6 +165,9 @@ def complete(
     nested : {"given", "cavities", "bodies"}
         What bodies within others are: bodies or cavities, by their orientation; cavities, with bodies inside those, as
         in slicers; or always bodies.
+    seal : float, optional
+        Seal openings of meshes narrower than this length, to about a sixth of it, and fill what lies behind them: of
+        double skins, leaks, bodies within and rubbish, only what is reached from outside is left, as it was given.
     constraint, diffusion : Constraint, float
         Options of the signed heat method, where that completes.
     progress : callable, optional
@@ -198,7 +207,7 @@ def complete(
     >>> solid.distance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).round(1).tolist()
     [-1.0, 1.0]
     """
-    options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
+    options = Completion(completion, lids, nested, as_oriented, keep_overlaps, seal)
     return completed(shape, options, Heat(constraint, diffusion), progress)
 
 
@@ -215,6 +224,8 @@ def completed(
     if isinstance(shape, Solid):
         return shape
     joined = joined_shape(shape)
+    if options.seal is not None and not isinstance(joined, PointCloud):
+        return _sealed(joined, options.seal, replace(options, seal=None, as_oriented=True), method, progress)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
     parts = "points" if isinstance(joined, PointCloud) else "faces"
     refuse_beyond_memory(
@@ -253,6 +264,18 @@ def completed(
         warn_user(f"{completed[0]}: where so much is missing, the result is a guess", InexactWarning)
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
+
+
+def _sealed(
+    shape: TriangleMesh | PolygonMesh, length: float, options: Completion, method: Heat, progress: Progress | None
+) -> Solid:
+    """Complete what is left of a mesh when its openings are sealed."""
+    skin, cut_from, note = sealed(shape.triangulation, length)
+    solid = completed(skin, options, method, progress)
+    origins = np.where(solid.origins >= 0, owners_of(shape)[cut_from][solid.origins], -1)
+    diagnostics = replace(solid.diagnostics, notes=(note, *solid.diagnostics.notes))
+    source = shape if isinstance(shape, TriangleMesh) else None
+    return replace(solid, origins=origins, source=source, diagnostics=diagnostics)
 
 
 def _with_whole_boundary(solid: Solid, mesh: TriangleMesh) -> Solid:
