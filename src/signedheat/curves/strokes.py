@@ -17,7 +17,7 @@ from ..errors import CancellingNormalsError
 from ..geodesics.exact_distance import shortest_arcs
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
-from ..mesh.components import connected_components, grouped, members_of, sums_of
+from ..mesh.components import grouped, members_of, sums_of
 from ..mesh.curve_segments import CurveSegments
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..method import diffuse, integrate, normalize
@@ -332,19 +332,6 @@ class Strokes:
         Strokes that are left out count in full, and those that bound it the wrong way round twice.
         """
         return inside.energy + float(self.lengths.sum())
-
-    def undrawn(self, inside: Inside) -> float:
-        """Return the length of lines of the boundary of the inside that touch no stroke."""
-        edges = self.surface.triangles.edges
-        falling, rising = self._uncovered(inside.signs)
-        first, second = inside.sides[edges.vertices].T
-        is_drawn = np.where(first > second, falling == 0, rising == 0)[edges.face_edges]
-        is_cut = (first != second)[edges.face_edges]
-        pairs = [edges.face_edges[is_cut[:, k] & is_cut[:, k - 1]][:, [k, k - 1]] for k in range(3)]
-        line = connected_components(len(first), *np.concatenate(pairs).T)
-        cut = np.unique(edges.face_edges[is_cut])
-        drawn = np.unique(line[edges.face_edges[is_cut & is_drawn]])
-        return float(self.costs[cut[~np.isin(line[cut], drawn)]].sum())
 
     def whole_loops(self, chosen: Bools) -> Bools:
         """(g,) the loops all of whose strokes, (k,), are chosen."""
