@@ -577,7 +577,7 @@ def _linear(shape: Shapes, values: Floats) -> Reach:
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
         raise UnsupportedTypeError(
             f"a {type(shape).__name__} has no vertices at which to give distances",
-            remedy="pass one mesh, or a function of places",
+            remedy="pass one mesh, or a function of points",
             element="distance",
         )
     points = mesh.points if isinstance(mesh, PointCloud) else mesh.vertices
@@ -605,7 +605,7 @@ def _linear(shape: Shapes, values: Floats) -> Reach:
 
 def _warn_not_hollow(inner: float) -> None:
     warn_user(
-        f"the shape is not hollowed: no place of it is {-inner:g} deep at the resolution of the grid. Use a wall "
+        f"the shape is not hollowed: no point of it is {-inner:g} deep at the resolution of the grid. Use a wall "
         "thinner than half of the part",
         InexactWarning,
     )

@@ -55,7 +55,7 @@ def test_only_holes_up_to_a_size_or_those_that_are_named():
     assert small.face_areas.sum() + named.face_areas.sum() - sheet.face_areas.sum() == pytest.approx(400.0)
     outline = sh.fill_holes(sheet, rims=[0])
     assert len(outline.filled[0]) == 80 and len(outline.left) == 2
-    with pytest.raises(sh.errors.SourceError, match="no rim passes through vertex 220"):
+    with pytest.raises(sh.errors.SourceError, match="no boundary loop passes through vertex 220"):
         sh.fill_holes(sheet, rims=[220])
     assert sh.fill_holes(sheet, largest=1.0).n_faces == sheet.n_faces
 
@@ -123,9 +123,9 @@ def test_on_the_command_line(tmp_path, capsys):
     perforated().save(tmp_path / "sheet.ply")
     command = ["fill", str(tmp_path / "sheet.ply"), "-o", str(tmp_path / "filled.ply")]
     assert main([*command, "--largest", "16"]) == 0
-    assert "holes closed: 1" in capsys.readouterr().out
+    assert "holes filled: 1" in capsys.readouterr().out
     assert main(command) == 0
-    assert "holes closed: 2" in capsys.readouterr().out
+    assert "holes filled: 2" in capsys.readouterr().out
     assert sh.read(tmp_path / "filled.ply").face_areas.sum() == pytest.approx(400.0)
     assert main([*command, "--rims", "220"]) == 1
     assert "vertex 220" in capsys.readouterr().err

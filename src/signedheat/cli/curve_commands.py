@@ -70,7 +70,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
             help="the method's own field, of the curves as they are given, not measured to the curves themselves",
         ),
         option("--as-oriented", action="store_true", help="turn no curves, and leave none out"),
-        option("--every-piece", action="store_true", help="leave out no piece, even if it belongs to no other"),
+        option("--every-piece", action="store_true", help="leave out no stroke, even if it belongs to no other"),
     )
 
 
@@ -96,7 +96,7 @@ def check_curves(arguments: Namespace) -> None:
     option(
         "--subdivide",
         action="store_true",
-        help="write the flat pieces of the surface on which the field is linear, where it was computed on better "
+        help="write the flat polygons of the surface on which the field is linear, where it was computed on better "
         "triangles than those of the mesh, whose vertices come first",
     ),
     *(option("--preview", metavar="PNG", help="draw the result"), UP, format_option("ply")),

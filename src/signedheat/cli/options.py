@@ -383,7 +383,7 @@ LIDS_OPTION = option(
     "--lids",
     choices=("bent", "flat"),
     default="bent",
-    help="lids continue the bend of the surface, or are flat, as for half models and hulls",
+    help="patches continue the curvature of the surface, or are flat, as for half models and hulls",
 )
 REPAIR = group(
     "steps (all taken by default)",
@@ -394,7 +394,7 @@ REPAIR = group(
         "--nested",
         choices=("given", "cavities", "bodies"),
         default="given",
-        help="closed pieces inside others are oriented as given, cavities as in slicers, or bodies",
+        help="closed bodies inside others are oriented as given, cavities as in slicers, or bodies",
     ),
 )
 COMPLETION_STEPS = group(
@@ -403,7 +403,7 @@ COMPLETION_STEPS = group(
     option("--plain", action="store_true", help="the method's own field, not measured to the shape itself"),
 )
 METHOD = group(
-    "method (completes points and triangles that scatter; lids complete other shapes, unless with --plain)",
+    "method (completes points and triangles that scatter; patches complete other shapes, unless with --plain)",
     option(
         "--constraint",
         type=constraint,

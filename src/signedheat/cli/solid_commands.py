@@ -256,13 +256,13 @@ def morph(arguments: Namespace) -> Summary:
     "Sheets stay sheets, with their outlines. `watertight` makes solids of broken shapes.",
     option("mesh", metavar="MESH", help="surface: .stl .obj .ply .off .vtp .glb .3mf"),
     output(SURFACES),
-    option("--largest", type=positive, metavar="L", help="close only rims up to this length"),
+    option("--largest", type=positive, metavar="L", help="fill only holes whose boundary loop is at most this long"),
     option(
         "--rims",
         type=whole_number(0),
         nargs="+",
         metavar="V",
-        help="close only rims through these vertices, counted from 0, including outlines of sheets",
+        help="fill only boundary loops through these vertices, counted from 0, including outlines of sheets",
     ),
     *(LIDS_OPTION, format_option("stl")),
     usage="MESH -o OUT [options]",
@@ -275,7 +275,7 @@ def fill(arguments: Namespace) -> Summary:
         filled = sh.fill_holes(mesh, largest=arguments.largest, rims=arguments.rims, lids=arguments.lids)
     sh.save(filled, arguments.output)
     counts = {"filled": len(filled.filled), "left": len(filled.left), "new_faces": int((filled.origins < 0).sum())}
-    text = "holes closed: {filled}, by {new_faces} faces; rims left open: {left}".format(**counts)
+    text = "holes filled: {filled}, by {new_faces} faces; boundary loops left open: {left}".format(**counts)
     summary = {"input": arguments.mesh, "output": arguments.output, **counts}
     return summary, f"{printable(arguments.output)}: {text}"
 

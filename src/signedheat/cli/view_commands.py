@@ -203,7 +203,7 @@ def take_inputs(arguments: Namespace, *names: str) -> None:
     "deviation",
     "deviation of a scan from a nominal part",
     "Signed distances of a scan's points to a nominal part, positive outside: percentiles, shares within tolerances, "
-    "the worst places, and optionally the scan in colours, a picture with a histogram, or a table. The scan must be "
+    "the worst points, and optionally the scan in colours, a picture with a histogram, or a table. The scan must be "
     "aligned with the part.",
     option(
         "scan", metavar="SCAN", nargs="?", help="mesh or points: .stl .obj .ply .off .vtp .glb .xyz .pcd .las .laz .e57"
@@ -223,7 +223,7 @@ def take_inputs(arguments: Namespace, *names: str) -> None:
         type=whole_number(0),
         metavar="N",
         default=10,
-        help="list the places with the largest deviations (10)",
+        help="list the points with the largest deviations (10)",
     ),
     UNITS_OPTION,
     check=lambda arguments: take_inputs(arguments, "scan", "nominal"),
@@ -262,7 +262,7 @@ def deviation(arguments: Namespace) -> Summary:
 @command(
     "thickness",
     "thickness of walls, and where they are thinnest",
-    "The diameter of the largest ball behind each place of a shape, broken or not: the thickness of walls. Optionally "
+    "The diameter of the largest ball behind each point of a shape, broken or not: the thickness of walls. Optionally "
     "the shape in colours, arrays, or a picture.",
     option("shape", metavar="SHAPE", nargs="?", help="surface or oriented points: .stl .obj .ply .off .vtp .glb .3mf"),
     outputs("any of: coloured .ply, arrays .npz, picture .png .pdf .svg .jpg"),

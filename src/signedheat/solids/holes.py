@@ -117,7 +117,7 @@ def fill_holes(
     GeometryError
         If the shape is no mesh.
     SourceError
-        If no rim passes through one of the vertices.
+        If no boundary loop passes through one of the vertices.
 
     See Also
     --------
@@ -199,7 +199,9 @@ def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
     missed = ~np.any(np.array(hits_by_loop, dtype=bool).reshape(-1, len(named)), axis=0)
     if missed.any():
         vertex = f"vertex {named[np.argmax(missed)]}"
-        raise SourceError(f"no rim passes through {vertex}", element=vertex, remedy="name vertices of open edges")
+        raise SourceError(
+            f"no boundary loop passes through {vertex}", element=vertex, remedy="name vertices of open edges"
+        )
     return np.array([hits.any() for hits in hits_by_loop], dtype=bool)
 
 
