@@ -7,6 +7,7 @@ import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
 from signedheat.errors import InexactWarning
+from signedheat.solids.completion import overruled
 
 SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
 """Corners of the sides of a box: −z, z, −y, y, −x, x; corner 4 k + 2 j + i is at (i, j, k)."""
@@ -214,3 +215,23 @@ def test_stray_points_are_left_out_and_told(share):
     assert solid.volume == pytest.approx(4 / 3 * np.pi, rel=0.02)
     assert "stray points left out" in str(solid.diagnostics.notes[0])
     assert not sh.complete(sh.PointCloud(points)).diagnostics.notes[0].as_dict().get("stray_points")
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 44])
+@pytest.mark.parametrize("diagonals", [lambda corner: 0, lambda corner: sum(corner) % 2], ids=["alike", "crossed"])
+def test_bricks_that_touch_stay_bricks_when_a_tenth_of_their_triangles_is_flipped(seed, diagonals):
+    shape = bricks(2, 2, 1, diagonals=diagonals)
+    flipped = np.random.default_rng(seed).random(len(shape[1])) < 0.1
+    assert volume(turned(shape, flipped)) == pytest.approx(4.0)
+
+
+def test_a_bowl_with_a_jagged_lip_is_hollow():
+    outer, inner = below(ball(), 0.05), below(ball(3, 0.8), 0.05)
+    bowl = volume(joined(outer, turned(inner, slice(None))))
+    assert bowl == pytest.approx(2 / 3 * np.pi * (1 - 0.8**3), rel=0.05)
+
+
+def test_winding_numbers_that_the_completion_overrules_are_counted():
+    solid = sh.complete(ball())
+    assert overruled(solid, solid.triangles) == 0
+    assert overruled(solid, solid.triangles[:, ::-1]) == pytest.approx(np.pi / 6, rel=0.1)  # of the box around it

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Frozen, Ints
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, first_members, sums_of
 from ..mesh.triangles import area_vectors, cone_volumes
@@ -99,6 +99,12 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         rows = np.flatnonzero(~whole & (decided.counts != other.counts))
         return np.bincount(part_of[rows], chain.areas[rows], len(part_areas)) / np.maximum(part_areas, 1e-300)
 
+    def differs(one: Reading, other: Reading) -> Bools:
+        """(p,) whether two readings count, or connect, triangles of each part in different ways."""
+        firsts = [first_members(reading.pieces, len(reading.orientable))[reading.pieces] for reading in (one, other)]
+        rows = np.flatnonzero(~whole & ((one.counts != other.counts) | (firsts[0] != firsts[1])))
+        return mask_of(len(part_areas), part_of[rows])
+
     missing = missing_of(decided)
     readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)
     if cone_volumes(chain.triangles, given.counts, part_of + 1, len(part_areas) + 1).sum() < 0:
@@ -107,16 +113,14 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         left = missing_of(other)
         if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
             readings, decided, missing = [inside_out], other, left
-    by_odd, by_once = odd(chain), once(chain)
+    by_odd, by_once, around = odd(chain), once(chain), once_around(chain)
     # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
     doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
-    differ = np.bincount(part_of[~whole], (by_odd.counts != by_once.counts)[~whole], len(missing)) > 0
-    doubled = np.bincount(part_of[~whole], (chain.copies % 2 == 0)[~whole], len(missing)) > 0
     every, as_cavities = np.ones(len(missing), dtype=bool), "cavities" if nested == "given" else nested
     trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
-        (by_odd, differ, WELL_EXPLAINED, True, nested),
+        (by_odd, differs(by_odd, by_once), WELL_EXPLAINED, True, nested),
         (by_once, every, WELL_EXPLAINED, True, nested),
-        (once_around(chain), doubled, WELL_EXPLAINED, True, nested),
+        (around, differs(around, by_odd) & differs(around, by_once), WELL_EXPLAINED, True, nested),
         (by_once, every, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
         (by_once, every, MOSTLY_WRONG, True, as_cavities),
     )
@@ -132,11 +136,11 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
             fixed = held & (tried == 0)
             other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nesting, united=united)
             overlapping |= other.overlapping
-            left, differs = missing_of(other), changed(decided, other)
-            cost = float(part_areas @ (left + LEAST_GAIN * differs))
+            left, price = missing_of(other), LEAST_GAIN * changed(decided, other)
+            cost = float(part_areas @ (left + price))
             if cost < best[0]:
                 best = cost, other, tried, left
-            better = todo & (left < missing - LEAST_GAIN * differs)
+            better = todo & (left < missing - price)
             if (better == todo).all() or not better.any():
                 break
             todo = better

@@ -26,6 +26,7 @@ from ..mesh.unit_vectors import axes_across
 from ..mesh.welding import indexed, tolerances
 from ..parallel import PointTree
 from ..search.face_tree import FaceTree
+from ..search.winding_tree import WindingTree
 from ..shapes.foreign import SurfaceShape
 from ..shapes.kinds import ShapeLike
 from ..shapes.transforms import joined_shape
@@ -101,6 +102,12 @@ ZERO_SET_FACES = 0.75
 
 MOSTLY_GIVEN = 0.25
 """Where more than this share of the surface is completed, a warning says so."""
+
+CLEAR_WINDING, EVIDENCE_PLACES = 0.9, 1000
+"""Winding numbers of faces say clearly what is inside above this, and what is outside below one minus this; and number
+of places in the box of a solid at which they are asked."""
+MOST_OVERRULED = 0.02
+"""Where the completion overrules clear winding numbers at more than this share of the places, a warning says so."""
 
 Completing = Literal["lids", "heat"]
 Lids = Literal["bent", "flat"]
@@ -190,7 +197,8 @@ def complete(
     Warns
     -----
     InexactWarning
-        If more than a quarter of the surface of a mesh is completed: what is missing is a guess.
+        If more than a quarter of the surface of a mesh is completed: what is missing is a guess. Also if the completion
+        contradicts what the winding numbers of the faces say clearly.
 
     See Also
     --------
@@ -259,9 +267,6 @@ def completed(
             solid = _with_whole_boundary(solid, triangles)
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
-    completed = [each for each in solid.diagnostics.notes if isinstance(each, CompletedArea)]
-    if completed and completed[0].completed_share > MOSTLY_GIVEN and not isinstance(joined, PointCloud):
-        warn_user(f"{completed[0]}: where so much is missing, the result is a guess", InexactWarning)
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
 
@@ -340,10 +345,27 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
     if len(bounds):
         closed, notes = _closed_by_lids(vertices, faces[bounds], chain.firsts[bounds], options.lids == "bent")
         surfaces.append(closed)
+    once = vertices[faces[(counts > 0) & ~torn]]
     sheets = np.flatnonzero(counts == 0)
     if len(sheets):
         surfaces.append(TriangleGroup(vertices[faces[sheets]], faces[sheets], chain.firsts[sheets], closing=False))
-    return united(surfaces, options.keep_overlaps, notes)
+    solid = united(surfaces, options.keep_overlaps, notes)
+    for note in solid.diagnostics.notes:
+        if not isinstance(note, CompletedArea):
+            continue
+        if note.completed_share > MOSTLY_GIVEN:
+            warn_user(f"{note}: where so much is missing, the result is a guess", InexactWarning)
+        elif not torn.any() and overruled(solid, once) > MOST_OVERRULED:
+            warn_user(f'{note}, against the winding numbers of its faces: try lids="flat"', InexactWarning)
+    return solid
+
+
+def overruled(solid: Solid, triangles: Floats) -> float:
+    """Return the share of the box of a solid where the (m, 3, 3) faces that bound it clearly say the opposite."""
+    lower, upper = solid.bounds
+    places = lower + np.random.default_rng(0).random((EVIDENCE_PLACES, 3)) * (upper - lower)
+    windings, inside = WindingTree.of(triangles).numbers(places), solid.inside(places)
+    return float(np.where(inside, windings < 1 - CLEAR_WINDING, windings > CLEAR_WINDING).mean())
 
 
 def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) -> tuple[TriangleGroup, list[Note]]:

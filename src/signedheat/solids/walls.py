@@ -8,9 +8,10 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..mesh.components import connected_components, next_in_groups
+from ..mesh.triangles import side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..parallel import PointTree
-from .lids import cut_to_pieces
+from .lids import SmoothRim
 from .rims import ALONG_EDGE, corners_of, opposite_edges
 from .spanning import area_vector
 
@@ -35,20 +36,22 @@ class Rim:
     centre: Floats  # (3,) centre of a ball around it
     radius: float  # radius of the ball
     opening: Floats  # (3,) area vector of a lid
+    smooth: Floats  # (k, 3) points of the rim without zigzags
+    beside: Ints  # (k,) the edge at the middle between each of these points and the next one
     reach: float  # largest width of a gap to another rim that is narrow: a strip there is smaller than half of the lid
 
     @classmethod
     def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
         """Return the rim of a loop of vertices; `behind` is the third corner of the face at each edge."""
         along = np.roll(corners, -1, axis=0) - corners
-        length = float(np.linalg.norm(along, axis=1).sum())
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along
         centre = corners.mean(axis=0)
         radius = float(np.linalg.norm(corners - centre, axis=1).max())
-        opening = area_vector(corners)
-        reach = NARROW * 2.0 * float(np.linalg.norm(opening)) / max(length, 1e-300)
-        return cls(ids, corners, unit(away), parts, centre, radius, opening, reach)
+        opening, rim = area_vector(corners), SmoothRim.of(corners)
+        smooth, beside = rim.points, rim.edges_at(0.5 * (rim.places[1:] + rim.places[:-1]))
+        reach = NARROW * 2.0 * float(np.linalg.norm(opening)) / max(float(side_lengths(smooth).sum()), 1e-300)
+        return cls(ids, corners, unit(away), parts, centre, radius, opening, smooth, beside, reach)
 
 
 def seams(rims: list[Rim]) -> list[Ints]:
@@ -173,18 +176,17 @@ def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
 
     The second is negative if the strip leads back over the surface. Each edge counts times the way from its middle.
     """
-    along = np.roll(rim.corners, -1, axis=0) - rim.corners
-    lengths = np.linalg.norm(along, axis=1)
-    edges, shares = cut_to_pieces(other.corners)
-    places = other.corners[edges] + shares[:, None] * (np.roll(other.corners, -1, axis=0) - other.corners)[edges]
+    along = np.roll(rim.smooth, -1, axis=0) - rim.smooth
+    lengths, places = np.linalg.norm(along, axis=1), other.smooth
     base = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
     steps = np.linalg.norm(base, axis=1)
     base /= np.maximum(steps, 1e-300)[:, None]
-    middles = rim.corners + 0.5 * along
+    middles = rim.smooth + 0.5 * along
     nearest = PointTree(places).query(middles)[1]
     across = places[nearest] - middles
     across -= np.clip((across * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
-    return float(lengths @ np.linalg.norm(across, axis=1)), float(lengths @ (across * rim.onward).sum(axis=1))
+    onward = (across * rim.onward[rim.beside]).sum(axis=1)
+    return float(lengths @ np.linalg.norm(across, axis=1)), float(lengths @ onward)
 
 
 def strip(one: Rim, other: Rim) -> Ints:
