@@ -11,6 +11,7 @@ import trimesh
 
 import signedheat as sh
 from refusals import refused
+from shapes.bodies import box
 from signedheat import samples
 from signedheat.batches import Job
 from signedheat.cli import main
@@ -202,6 +203,10 @@ def test_info_names_a_command_for_each_defect_that_mends_it(tmp_path, capsys, mo
     shapes = {
         "ball with holes.ply": (samples.without_patches(ball, 2, 0.4), {"holes"}),
         "doubled.stl": (sh.TriangleMesh(ball.vertices, [*ball.faces, *ball.faces[:5]]), {"duplicate_faces"}),
+        "touching.stl": (
+            samples.union(box((0, 0, 0), (1, 1, 1)), box((1, 1, 0), (2, 2, 1))),
+            {"nonmanifold_edges"},
+        ),
         "hidden.off": (samples.union(ball, inner), {"hidden_parts"}),
         "sheet.obj": (sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0.2]], [[0, 1, 2]]), {"sheets"}),
     }

@@ -156,6 +156,8 @@ def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Def
     """
     stem, ending = os.path.splitext(file)
     ending = ending.lower() if ending.lower() in SURFACE_FORMATS else ".stl"
+    if ending == ".stl" and counts.nonmanifold_edges:
+        ending = ".ply"  # STL would join again what touches along these edges
     name, filled, whole, wall = (shlex.quote(part) for part in (file, *(f"{stem}_{x}{ending}" for x in OUTPUTS)))
     repair = f"signedheat watertight {name} -o {whole}"
     borders = 0 if found.undecided_area > WHOLE_AREA else counts.borders  # the outlines of sheets are no holes
