@@ -140,3 +140,13 @@ def test_bodies_that_touch_have_edges_and_vertices_of_their_own():
     again, same = split_at_pinches(split, parted)
     assert again is split
     assert same is parted
+
+
+def test_segments_end_in_faces_that_rounding_flattens():
+    """Within the rounding of its length, 10¹⁶, every point of this face lies on every segment."""
+    points = np.zeros((10, 3))
+    points[:, 0] = 0, 1, 6.9e15, 2.61290342e9, 2.61287066e9, 0, 0, 0.85, 0.5, 0.671
+    points[:, 2] = 0, 0, 2.6e9, 2.61287091e9, 2.61287091e9, 2.61287091e9, 1, 0.526, 0.809, 0.671
+    corners, segments = np.array([[2, 5, 7]]), np.array([[7, 1], [7, 9], [6, 8], [8, 9]])
+    made, _, _ = triangulate_faces(points, np.array([0, 10]), np.arange(10), corners, np.array([0, 4]), segments)
+    assert set(made.ravel()) == set(range(10)) and len(made) == 2 * 10 - 7 - 2

@@ -344,7 +344,8 @@ def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
             return t, k, b
         for i in (u, w):
             ahead = (x[i, 0] - x[a, 0]) * (x[b, 0] - x[a, 0]) + (x[i, 1] - x[a, 1]) * (x[b, 1] - x[a, 1])
-            if ahead > 0.0 and ahead < length * length and abs(_turn(x, a, b, i)) <= flat * length:
+            nearer = ahead > 0.0 and _length(x, i, b) < length  # or segments through flat faces would not end
+            if nearer and abs(_turn(x, a, b, i)) <= flat * length:
                 return t, k, i
         if _turn(x, a, b, u) < 0.0 and _turn(x, a, b, w) > 0.0:
             crossed, edge = t, (k + 1) % 3
