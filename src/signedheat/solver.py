@@ -28,7 +28,7 @@ from .surfaces.source_segments import given_curves, numbers_kept, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .validation import positive_number, public_call, refuse_pair_apart, refuse_uncallable
+from .validation import callback, positive_number, public_call, refuse_pair_apart
 
 SOURCES_AT_ONCE = 16  # sources diffused at a time
 
@@ -103,7 +103,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 
     def __post_init__(self) -> None:
         refuse_pair_apart((self.domain, self.diffusion), "SignedHeatSolver")
-        refuse_uncallable(self.progress)
+        callback(self.progress, "progress(fraction, step)")
         object.__setattr__(self, "domain", converted(self.domain))
         if discretize.dispatch(type(self.domain)) is discretize.dispatch(object):
             discretize(self.domain)  # raises

@@ -7,6 +7,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
+from inspect import signature
 from numbers import Integral, Real
 from typing import Any, ParamSpec, TypeVar, cast, get_args
 
@@ -215,10 +216,17 @@ def flag(value: object, name: str) -> bool:
 
 def callback(function: object, call: str) -> None:
     """Refuse what cannot be called as `call` says, and is not None."""
-    if function is not None and not callable(function):
-        name = call.partition("(")[0]
-        cause = f"{name} is a {type(function).__name__}"
-        raise UnsupportedTypeError(cause, remedy=f"pass a function that is called as {call}", element=name)
+    if function is None:
+        return
+    name, _, rest = call.partition("(")
+    try:
+        signature(cast("Callable[..., object]", function)).bind(*rest.split(","))
+    except ValueError:  # compiled functions may have no signature
+        return
+    except TypeError:
+        kind = "takes other arguments" if callable(function) else f"is a {type(function).__name__}"
+        remedy = f"pass a function that is called as {call}"
+        raise UnsupportedTypeError(f"{name} {kind}", remedy=remedy, element=name) from None
 
 
 def instance(value: object, kind: type, name: str) -> None:
@@ -344,7 +352,7 @@ def public_call(function: Callable[P, T]) -> Callable[P, T]:
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> T:
         refuse_pair_apart(args, function.__name__)
-        refuse_uncallable(kwargs.get("progress"))
+        callback(kwargs.get("progress"), "progress(fraction, step)")
         return guarded(*args, **kwargs)
 
     return checked
@@ -362,16 +370,6 @@ def refuse_pair_apart(arguments: Sequence[object], name: str) -> None:
         ):
             remedy = "for points use sh.complete((vertices, faces)).distance(points)"
         raise UnsupportedTypeError("vertices and faces are one argument", remedy=remedy, element=f"argument {index}")
-
-
-def refuse_uncallable(progress: object) -> None:
-    """Raise if something other than a function is given to report progress."""
-    if progress is not None and not callable(progress):
-        raise SignedHeatError(
-            f"progress must be a function, not {progress!r:.50}",
-            remedy="pass a function that takes the fraction done and the name of the step",
-            element="progress",
-        )
 
 
 def are_points(thing: object) -> bool:

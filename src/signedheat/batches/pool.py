@@ -34,7 +34,7 @@ from ..io.files import move_into_place, replaceable, writing
 from ..jobs import MOST_THREADS, Announcement, Progress, command_for, logger
 from ..packages import require
 from ..parallel import connected, n_threads
-from ..validation import positive_number, refuse_deleted_folder, refuse_uncallable, whole_number
+from ..validation import callback, positive_number, refuse_deleted_folder, whole_number
 from .inputs import Input, expand, named_path
 from .job import Job
 from .manifest import Manifest, Outcome, State, source_of
@@ -363,7 +363,7 @@ def run(
     ...     batches.run(folder, f"{folder}/out", batches.Job(volume=".npz", resolution=16), workers=1)
     Batch(3 of 3 shapes done, 0 of them before)
     """
-    refuse_uncallable(progress)
+    callback(progress, "progress(fraction, text)")
     if scheduler is not None:
         require("distributed", "clusters")
     _refuse_odd(workers, threads, time_limit)

@@ -37,7 +37,6 @@ from ..validation import (
     public_call,
     query_points,
     refuse_beside,
-    refuse_uncallable,
     shaped,
 )
 from .contouring import announce_lost, sharp_surface
@@ -333,7 +332,6 @@ class Solid(Displayed, Represented, Frozen):
         >>> field.values.shape, field([[0.0, 0.0, 0.9]]).round(2)
         ((32, 32, 32), array([-0.1]))
         """
-        refuse_uncallable(progress)
         if grid is None:
             where = Grid.around(self.bounds, RESOLUTION if resolution is None else resolution, padding, spacing)
         else:
@@ -421,7 +419,6 @@ class Solid(Displayed, Represented, Frozen):
         >>> bool(np.abs(np.linalg.norm(contour.vertices, axis=1) - 0.8).max() < 0.02)
         True
         """
-        refuse_uncallable(progress)
         smooth = not flag(sharp, "sharp")
         if tolerance is not None:
             within = positive_number(tolerance, "tolerance")
