@@ -1,7 +1,7 @@
 """The boundary of a solid as closed triangles, proven equal to the solid of its chain.
 
-The winding numbers of a closed chain say what is inside. Triangles bound the same solid if they are closed, if the
-inside is behind each of them and not in front, and if they lie wherever the inside ends. Where the cut of a chain fails
+The winding numbers of a closed chain say what is inside. Triangles bound the same solid if they are closed, and if on
+both sides of all triangles of both their own winding number is 1 inside and 0 outside. Where the cut of a chain fails
 that proof, other ways to unite its bodies are tried. Bodies are the parts of the mesh that are closed as given, or what
 remains connected of the chain where the surfaces that meet along its edges are separated. If none passes through
 itself, manifold3d unites them: its result is closed however flat the angles are at which faces cross, and however close
@@ -14,14 +14,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.arrangement import SAME_POINT, arranged
-from ..mesh.components import element_components
 from ..mesh.edges import edge_table, orient_faces
 from ..mesh.pinches import separated
 from ..mesh.self_intersections import overlap, overlapping_faces
@@ -29,7 +28,6 @@ from ..mesh.triangles import area_vectors, face_areas, halved, heights, part_vol
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, indexed, same_positions, tolerances
 from ..packages import lazy_module
-from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from .closing import fan
 from .regions import TOLERANCES, cut_and_sided
@@ -75,9 +73,9 @@ class Bodies:
         labels, volumes = part_volumes(points, faces)
         faces = np.where((volumes < 0)[labels][:, None], faces[:, ::-1], faces)
         # the inside ends in front of the faces of bodies, and behind those of cavities
-        sides = Sides.of(points[faces], tolerances(points, faces, SAME_POINT), windings)
-        ends = sides.behind.astype(np.int64) - sides.ahead
-        inner = np.bincount(labels[sides.rows], ends * face_areas(points[faces])[sides.rows], len(volumes)) < 0
+        rows, places = _beside(points[faces], tolerances(points, faces, SAME_POINT))
+        behind, ahead = windings.inside(places).reshape(2, -1).astype(np.int64)
+        inner = np.bincount(labels[rows], (behind - ahead) * face_areas(points[faces])[rows], len(volumes)) < 0
         faces = np.where(inner[labels][:, None], faces[:, ::-1], faces)
         return cls(points, faces, labels, np.where(inner, -1.0, 1.0) * np.abs(volumes))._clean
 
@@ -155,8 +153,8 @@ def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None
         bodies = Bodies.of_chain(windings) if given is None else Bodies.of_mesh(given, windings)
         united = None if bodies is None else bodies.united
         if united is not None:
-            yield united
             yield _without_slits(united)
+            yield united
     for chain in (triangles, windings.triangles):
         if len(chain):
             yield _coned(*_cut_again(chain, windings))
@@ -219,50 +217,38 @@ def _simple_loops(edges: Ints) -> Iterator[Ints]:
 def same_solid(triangles: Floats, windings: Windings) -> bool:
     """Whether triangles are closed and bound the solid of some winding numbers, up to rounding.
 
-    Triangles must be where the inside of the solid ends, and it must be behind each of them and not in front, at one of
-    the distances up to which a cut may merge points. Those that are wrong nevertheless, as two that cover each other,
-    must be so small that they cannot enclose `WRONG_VOLUME`: a surface of area A encloses at most A^1.5 / (6 √π).
+    On both sides of the triangles, and of those of the solid, their own winding number must be 1 where the inside of
+    the solid is and 0 elsewhere, at one of the distances up to which a cut may merge points. Those that are wrong
+    nevertheless must be so small that they cannot enclose `WRONG_VOLUME`: a surface of area A encloses at most
+    A^1.5 / (6 √π).
     """
     points, faces = indexed(triangles)
     if not len(faces) or (edge_table(faces).balance != 0).any():
         return False
-    chosen = _spread(len(faces))
-    checked, widths = triangles[chosen], tolerances(points, faces, SAME_POINT)[chosen]
-    wrong = np.arange(len(chosen))
-    for multiple in TOLERANCES:
-        sides = Sides.of(checked[wrong], multiple * widths[wrong], windings)
-        wrong = wrong[sides.rows[~(sides.behind & ~sides.ahead)]]
-    parts = element_components(faces[chosen][wrong])
-    areas = np.bincount(parts, face_areas(checked[wrong])) * len(faces) / len(chosen)
+    made, wrong_area = Windings(triangles), 0.0
+    for chain, halvings in ((triangles, 0), (windings.triangles, 2)):
+        chosen = _spread(len(chain))
+        checked, widths = chain[chosen], tolerances(*indexed(chain), SAME_POINT)[chosen]
+        for _ in range(halvings):
+            checked, widths = halved(checked), np.tile(widths, 2)
+        wrong = np.arange(len(checked))
+        for multiple in TOLERANCES:
+            rows, places = _beside(checked[wrong], multiple * widths[wrong])
+            differ = np.abs(made.numbers(places) - windings.inside(places)) > 0.5
+            wrong = wrong[rows[differ.reshape(2, -1).any(axis=0)]]
+        wrong_area += float(face_areas(checked[wrong]).sum()) * len(chain) / len(chosen)
     corners = triangles - points.mean(axis=0)
     volume = float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners))) / 3.0
-    if (areas**1.5).sum() / (6.0 * np.sqrt(np.pi)) > WRONG_VOLUME * volume:
-        return False
-    chosen = _spread(len(windings.triangles))
-    widths = TOLERANCES[-1] * tolerances(*indexed(windings.triangles), SAME_POINT)[chosen]
-    sides = Sides.of(halved(halved(windings.triangles[chosen])), np.tile(widths, 4), windings)
-    ends = sides.behind != sides.ahead
-    off = FaceTree.of_triangles(triangles).distances(sides.centres[ends]) if ends.any() else np.zeros(0)
-    return bool((off <= 2.0 * sides.steps[ends]).all())
+    return wrong_area**1.5 / (6.0 * np.sqrt(np.pi)) <= WRONG_VOLUME * volume
+
+
+def _beside(triangles: Floats, steps: Floats) -> tuple[Ints, Floats]:
+    """Return which of (m, 3, 3) triangles are wider than two steps, (k,), and (2 k, 3) places behind and before them."""
+    rows = np.flatnonzero(heights(triangles) > 2.0 * steps)
+    centres, away = triangles[rows].mean(axis=1), steps[rows, None] * unit(area_vectors(triangles[rows]))
+    return rows, np.concatenate([centres - away, centres + away])
 
 
 def _spread(count: int) -> Ints:
     """Return at most `PROOF_SAMPLES` rows, evenly spread over all."""
     return np.linspace(0, count - 1, min(count, PROOF_SAMPLES)).astype(np.int64)
-
-
-class Sides(NamedTuple):
-    """Whether the inside lies on both sides of those triangles that are wide enough to have clear sides."""
-
-    rows: Ints  # (k,) the triangles
-    centres: Floats  # (k, 3)
-    steps: Floats  # (k,) distances from the centres at which sides were taken
-    behind: Bools  # (k,) whether the inside is behind the centre
-    ahead: Bools  # (k,) and in front of it
-
-    @classmethod
-    def of(cls, triangles: Floats, steps: Floats, windings: Windings) -> Sides:
-        """Find sides at (m,) distances from (m, 3, 3) triangles."""
-        rows = np.flatnonzero(heights(triangles) > 2.0 * steps)
-        centres, away = triangles[rows].mean(axis=1), steps[rows, None] * unit(area_vectors(triangles[rows]))
-        return cls(rows, centres, steps[rows], windings.inside(centres - away), windings.inside(centres + away))
