@@ -243,7 +243,7 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
 
 
 def _beside(triangles: Floats, steps: Floats) -> tuple[Ints, Floats]:
-    """Return which of (m, 3, 3) triangles are wider than two steps, (k,), and (2 k, 3) places behind and before them."""
+    """Return which of (m, 3, 3) triangles are wider than two steps, (k,), and (2 k, 3) places behind and before."""
     rows = np.flatnonzero(heights(triangles) > 2.0 * steps)
     centres, away = triangles[rows].mean(axis=1), steps[rows, None] * unit(area_vectors(triangles[rows]))
     return rows, np.concatenate([centres - away, centres + away])
