@@ -11,7 +11,11 @@ from pathlib import Path
 from ..errors import FileFormatError
 from ..io.files import extension
 from ..io.shape_files import READERS
+from ..io.urdf import meshes_of
 
+ROBOT = ".urdf"
+"""Extension of descriptions of robots."""
+UNSCALED = (1.0, 1.0, 1.0)
 WILDCARDS = frozenset("*?[")
 
 
@@ -21,17 +25,20 @@ class Input:
 
     path: Path
     name: str
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # along its axes, as a robot refers to it
 
 
 def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None) -> list[Input]:
     """List every shape among files, folders and patterns once, in order.
 
     Folders are searched recursively for files with the extension of a shape, except in `results`. Files that are named
-    are taken whatever their extension. Results are named after the files: ``parts/a.stl`` in the folder ``.`` gives
-    ``parts/a``, and files that differ only in extension keep it.
+    are taken whatever their extension. A robot (``.urdf``) stands for the meshes that it refers to. Results are named
+    after the files: ``parts/a.stl`` in the folder ``.`` gives ``parts/a``, and files that differ only in extension keep
+    it.
     """
-    paths: dict[str, Path] = {}  # by resolved path
-    below: dict[str, str] = {}  # path relative to the folder that was searched, by resolved path
+    paths: dict[str, Path] = {}  # by resolved path, and scale if a robot gives one
+    below: dict[str, str] = {}  # path relative to the folder that was searched, in the same way
+    scales: dict[str, tuple[float, float, float]] = {}
     for name in inputs:
         try:
             files, root = _files(named_path(name), results)
@@ -39,13 +46,30 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
             cause = f"cannot be searched ({error.strerror})"
             raise FileFormatError(cause, remedy="check the name", path=error.filename or name) from error
         for path in files:
+            if extension(path) == ROBOT:
+                for mesh, scale in meshes_of(path):
+                    key = f"{os.path.realpath(mesh)}*{scale}"
+                    paths.setdefault(key, mesh)
+                    below.setdefault(key, _name_in_robot(path, root, mesh, scale))
+                    scales[key] = scale
+                continue
             place = os.path.join(os.path.realpath(path.parent), path.name)
             inner = path.relative_to(root)
             paths.setdefault(place, path)
             below.setdefault(place, path.name if ".." in inner.parts else str(inner))
     if not paths:
         raise FileFormatError("the inputs contain no shape", remedy="name files, folders or patterns")
-    return [Input(path, name) for path, name in zip(paths.values(), _names(below), strict=True)]
+    names = _names(below)
+    return [
+        Input(path, name, scales.get(key, UNSCALED)) for (key, path), name in zip(paths.items(), names, strict=True)
+    ]
+
+
+def _name_in_robot(robot: Path, root: Path, mesh: Path, scale: tuple[float, float, float]) -> str:
+    """Return the name of a mesh of a robot: in a folder of the robot's name, with its scale if it has one."""
+    folder = robot.relative_to(root).with_suffix("")
+    factor = "" if scale == UNSCALED else "_x" + "_".join(f"{each:g}" for each in dict.fromkeys(scale))
+    return str(folder / f"{mesh.stem}{factor}{mesh.suffix}")
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
@@ -67,7 +91,9 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
                 path=path,
             )
         inner = (Path(folder, name) for folder, _, names in os.walk(path, onerror=_fail) for name in names)
-        shapes = sorted(file for file in inner if extension(file) in READERS and _is_file_or_broken_link(file))
+        shapes = sorted(
+            file for file in inner if extension(file) in {*READERS, ROBOT} and _is_file_or_broken_link(file)
+        )
         if avoided is not None:
             shapes = [file for file in shapes if not Path(os.path.realpath(file)).is_relative_to(avoided)]
         return shapes, path

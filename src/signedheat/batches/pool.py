@@ -27,15 +27,20 @@ from importlib import import_module
 from pathlib import Path
 from signal import SIG_IGN, SIGINT, Signals, signal
 from types import FunctionType
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
 
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
 from ..io.files import move_into_place, replaceable, writing
+from ..io.shape_files import read, save
 from ..jobs import MOST_THREADS, Announcement, Progress, command_for, logger
 from ..packages import require
 from ..parallel import connected, n_threads
+from ..shapes.transforms import transform
+from ..solids.solid import Solid
 from ..validation import callback, positive_number, refuse_deleted_folder, whole_number
-from .inputs import Input, expand, named_path
+from .inputs import UNSCALED, Input, expand, named_path
 from .job import Job
 from .manifest import Manifest, Outcome, State, source_of
 
@@ -70,7 +75,8 @@ class Task:
             warnings.simplefilter("default")
             try:
                 self.scratch.mkdir(parents=True)
-                figures = dict(self.job(self.shape.path.absolute(), self.scratch / target.name))
+                with self._scaled() as path:
+                    figures = dict(self.job(path, self.scratch / target.name))
                 json.dumps(figures)  # raises TypeError if the manifest could not hold them
                 outputs = [(Path(self.shape.name).parent / name).as_posix() for name in self._move_to(target.parent)]
                 warned = [str(warning.message) for warning in caught if issubclass(warning.category, UserWarning)]
@@ -85,6 +91,17 @@ class Task:
         shutil.rmtree(self.scratch, ignore_errors=True)
         figures = figures if state == "done" else {}
         return self.outcome(state, time.perf_counter() - begin, message, tuple(outputs), figures), is_starved
+
+    @contextmanager
+    def _scaled(self) -> Iterator[Path]:
+        """Give the file of the shape; a scaled copy, which is deleted afterwards, if a robot scales it."""
+        if self.shape.scale == UNSCALED:
+            yield self.shape.path.absolute()
+            return
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder, "scaled.npz" if isinstance(shape := read(self.shape.path), Solid) else "scaled.ply")
+            save(cast("Any", transform(shape, np.diag([*self.shape.scale, 1.0]))), path)
+            yield path
 
     def outcome(
         self,
@@ -374,16 +391,22 @@ def run(
     shapes = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
     if isinstance(job, Job):
         job.refuse_shared_names(shapes)
-    described = _described(job)
+    whatever = _described(job)
+
+    def described(shape: Input) -> str:
+        return whatever if shape.scale == UNSCALED else f"{whatever} of {shape.scale} times the shape"
+
     with ExitStack() as stack:
         scratch = stack.enter_context(_locked(target))
         manifest = Manifest(target)
-        earlier = {shape.name: manifest.still_holds(shape.name, shape.path, described) for shape in shapes}
+        earlier = {shape.name: manifest.still_holds(shape.name, shape.path, described(shape)) for shape in shapes}
         done = {name: outcome for name, outcome in earlier.items() if outcome is not None}
         skipped = len(done)
         manifest.write(done.values())
         todo = [shape for shape in shapes if shape.name not in done]
-        tasks = [Task(job, described, shape, target.absolute(), scratch / str(k)) for k, shape in enumerate(todo)]
+        tasks = [
+            Task(job, described(shape), shape, target.absolute(), scratch / str(k)) for k, shape in enumerate(todo)
+        ]
         if scheduler is not None:
             outcomes = _on_cluster(tasks, scheduler, threads, time_limit)
         else:

@@ -1,0 +1,58 @@
+"""Meshes that descriptions of robots refer to: URDF, the Unified Robot Description Format."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from xml.etree import ElementTree
+
+from ..errors import FileFormatError
+from .budgets import XML, charge_tree
+from .files import PathLike, contents, reading
+from .numerals import parsed_numbers
+
+Scale = tuple[float, float, float]
+
+
+def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
+    """Return the files of all meshes of a robot, each once with every scale along its axes, in order.
+
+    Names that begin with ``package://`` are looked for below the folder of the description and those above it.
+    """
+    with reading(path):
+        data = contents(path)
+        charge_tree(data, XML)
+        try:
+            root = ElementTree.fromstring(data)
+        except ElementTree.ParseError as error:
+            raise FileFormatError(f"it is no XML ({error})", remedy="expand macros first: xacro robot.xacro") from error
+        if root.tag != "robot":
+            raise FileFormatError(f"its root is <{root.tag:.40}>, not <robot>", remedy="name a URDF file")
+        found = {}
+        for mesh in root.iter("mesh"):
+            name = mesh.get("filename", "")
+            scale = parsed_numbers(mesh.get("scale", "1 1 1").split(), "a scale")
+            if not name or "\0" in name or len(scale) != 3 or not (scale != 0).all():
+                raise FileFormatError(
+                    f"a mesh has the name {name!r:.80} and the scale {mesh.get('scale')!r:.40}",
+                    remedy="give a name, and three numbers that are not 0",
+                )
+            found[_located(Path(path), name), tuple(map(float, scale))] = None
+        if not found:
+            raise FileFormatError("it refers to no mesh", remedy="name the meshes themselves")
+    return list(found)
+
+
+def _located(robot: Path, name: str) -> Path:
+    """Return the path of a mesh that a robot names; the path beside the robot if there is no such file."""
+    scheme, separator, rest = name.partition("://")
+    if scheme == "file" and separator:
+        return Path(rest)
+    inner = rest if separator else name
+    if Path(inner).is_absolute():
+        return Path(inner)
+    parts = Path(inner).parts
+    names = [inner] if not separator else [inner, os.path.join(*parts[1:])] if len(parts) > 1 else [inner]
+    folders = [robot.absolute().parent, *(robot.absolute().parents if separator else ())]
+    places = [folder / each for folder in folders for each in names]
+    return next((place for place in places if place.is_file()), places[0])
