@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from signedheat.inspection import inspect
 
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
 from signedheat.batches.inputs import expand
 from signedheat.cli import main
+from signedheat.shapes.inspection import inspect
 
 ROBOT = """<robot name="arm">
   <link name="base">
