@@ -37,6 +37,7 @@ from .shapes.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDom
 from .shapes.transforms import concatenated
 from .solids.completion import complete
 from .solids.contouring import CONTOUR_PLACES, sharp_surface
+from .solids.extrusion import extrude
 from .solids.gauss import Pieces, sampled
 from .solids.implicit_surfaces import contour
 from .solids.offsets import Offset, Reach, SheetWall, checked_reach
@@ -60,7 +61,7 @@ from .validation import (
 )
 
 __all__ = [
-    "closing", "dilate", "erode", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
+    "closing", "dilate", "erode", "extrude", "offset", "opening", "shell", "smooth_difference", "smooth_intersection",
     "smooth_union", "thicken",
 ]  # fmt: skip
 

@@ -1,0 +1,115 @@
+"""Solids between a sheet, or outlines in the plane, and a plane across z."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import GeometryError
+from ..grids.polyline import Polyline
+from ..mesh.edges import edge_table, orient_faces
+from ..mesh.polylines import filled_outlines
+from ..mesh.triangles import face_areas, part_volumes
+from ..packages import lazy_module
+from ..shapes.foreign import as_shapes
+from ..shapes.kinds import Polylines, Shapes
+from ..shapes.transforms import joined_shape
+from ..surfaces.point_cloud import PointCloud
+from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import finite_number, public_call
+from .rims import boundary
+
+manifold3d: Any = lazy_module("manifold3d", "triangles of outlines")
+
+
+@public_call
+def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
+    """Extrude a sheet, or outlines in the plane, along z to a plane, as a closed mesh with upright walls.
+
+    Terrain and reliefs get a base below them or above. Outlines lie at z = 0; those within others are holes. Faces of
+    a sheet are kept as they are.
+
+    Parameters
+    ----------
+    shape : open surface; or closed Polyline, several, or polygons of shapely or GeoJSON
+        What is extruded.
+    to : float
+        Height of the plane, z.
+
+    Returns
+    -------
+    TriangleMesh
+        Closed, facing outwards. Where a sheet hangs over itself, walls pass through it: `complete` makes one body.
+
+    Raises
+    ------
+    GeometryError
+        If a surface is closed, or reaches the plane; or outlines are open or bound nothing.
+
+    See Also
+    --------
+    morphology.thicken : Give a sheet a thickness.
+    signedheat.fill_holes : Close holes, and leave the rest of a mesh as it is.
+
+    Examples
+    --------
+    >>> from signedheat import Polyline, TriangleMesh
+    >>> plate = [[0, 0], [4, 0], [4, 4], [0, 4]], [[1, 1], [2, 1], [2, 2], [1, 2]]
+    >>> round(extrude([Polyline(line, closed=True) for line in plate], 2.0).volume, 9)
+    30.0
+    >>> roof = TriangleMesh([[0, 0, 1], [1, 0, 1], [1, 1, 2], [0, 1, 2]], [[0, 1, 2], [0, 2, 3]])
+    >>> round(extrude(roof, 0.0).volume, 9)
+    1.5
+    """
+    height = finite_number(to, "to")
+    parts = as_shapes(shape)
+    if parts and all(isinstance(part, Polyline) for part in parts):
+        vertices, faces = _filled(parts)
+    else:
+        vertices, faces = _sheet(joined_shape(shape), height)
+    n, rim = len(vertices), boundary(faces)
+    tails, heads = rim.T
+    foot = vertices.copy()
+    foot[:, 2] = height
+    walls = [np.stack(corners, axis=1) for corners in ((tails, heads, heads + n), (tails, heads + n, tails + n))]
+    closed = np.concatenate([faces, faces[:, ::-1] + n, *walls])
+    both = np.concatenate([vertices, foot])
+    if float(part_volumes(both, closed)[1].sum()) < 0:
+        closed = closed[:, ::-1]
+    used, closed = np.unique(closed, return_inverse=True)
+    return TriangleMesh(both[used], closed.reshape(-1, 3))
+
+
+def _filled(lines: list[Polyline]) -> tuple[Floats, Ints]:
+    """Return the triangles, at z = 0, that outlines fill."""
+    for number, line in enumerate(lines):
+        if not line.closed:
+            raise GeometryError(f"polyline {number} is open", remedy="close it", element=f"polyline {number}")
+    outlines = [outline[::-1] for outline in filled_outlines([line.points for line in lines], "nonzero")]
+    if not outlines:
+        raise GeometryError("the outlines bound nothing", remedy="check their points", element="polyline 0")
+    points = np.concatenate(outlines)
+    size = float(np.ptp(points, axis=0).max())
+    scaled = [(outline - points.mean(axis=0)) / size for outline in outlines]
+    return np.pad(points, ((0, 0), (0, 1))), np.asarray(manifold3d.triangulate(scaled), dtype=np.int64)
+
+
+def _sheet(shape: Any, height: float) -> tuple[Floats, Ints]:
+    """Return the faces of an open surface, turned to agree, that does not reach a height."""
+    if isinstance(shape, PointCloud):
+        raise GeometryError("points are no sheet", remedy="make a surface of them first", element="shape")
+    mesh = shape.triangulation.joined
+    faces = mesh.faces[(face_areas(mesh.vertices[mesh.faces]) > 0)]
+    heights = mesh.vertices[np.unique(faces), 2] - height
+    if not len(heights) or (heights.min() <= 0 <= heights.max()):
+        raise GeometryError(
+            f"the sheet reaches the plane z = {height:g}",
+            remedy="choose a plane below or above all of it",
+            element="to",
+        )
+    if not (edge_table(faces).face_counts == 1).any():
+        raise GeometryError("the surface is closed, and no sheet", remedy="extrude a part of it", element="shape")
+    agree = orient_faces(faces, face_areas(mesh.vertices[faces]), mesh.n_vertices)
+    return mesh.vertices, np.where(agree.turned[:, None], faces[:, ::-1], faces)
