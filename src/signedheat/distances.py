@@ -169,7 +169,7 @@ def signed_distance(
     band : float, optional
         In space: compute only nodes of the grid whose distance is at most this length, for fine grids.
     completion, lids, nested : str
-        In space: see `complete`.
+        In space: see `complete`. With ``completion="none"``, on surfaces too, distance is unsigned, to what is there.
     constraint : Free, ZeroSet or Soft, optional
         Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float, optional
@@ -242,6 +242,8 @@ def signed_distance(
     options = {name: given[name] for name, default in DEFAULTS.items() if given[name] is not default}
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
+    if measure is distance_to_curves and options.get("completion") == "none":
+        source, options = _without_sides(source), {name: options[name] for name in options if name != "completion"}
     parameters = inspect.signature(measure).parameters.values()
     accepted = [parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY]
     if domain is not None:
@@ -333,6 +335,15 @@ def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
     if isinstance(domain, Grid):
         return distance_to_shapes if domain.dimension == 3 else distance_to_lines
     return distance_to_shapes if isinstance(domain, TetMesh) else distance_to_curves
+
+
+def _without_sides(source: Any) -> Any:
+    """Return curves, and sequences of them, without sides: distance to them is unsigned, and completes nothing."""
+    if isinstance(source, Curve):
+        return Curve(source.faces, source.barycentric, source.closed, oriented=False)
+    if isinstance(source, Sequence) and all(isinstance(item, Curve | SurfacePoints | Sequence) for item in source):
+        return [_without_sides(item) for item in source]
+    return source
 
 
 def _refuse_points(source: object, domain: object) -> None:

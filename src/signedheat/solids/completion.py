@@ -109,7 +109,7 @@ of places in the box of a solid at which they are asked."""
 MOST_OVERRULED = 0.02
 """Where the completion overrules clear winding numbers at more than this share of the places, a warning says so."""
 
-Completing = Literal["lids", "heat"]
+Completing = Literal["lids", "heat", "none"]
 Lids = Literal["bent", "flat"]
 
 
@@ -161,8 +161,9 @@ def complete(
         A shape, broken or not; points may lack normals. Like every function that takes shapes, this takes objects of
         trimesh, PyVista, meshio and Open3D and pairs (vertices, faces). A `Solid` is returned unchanged,
         whatever the options.
-    completion : {"lids", "heat"}
-        Close meshes by lids, or by the zero set of φ where no face is, as in the paper (Feng & Crane 2024).
+    completion : {"lids", "heat", "none"}
+        Close meshes by lids, or by the zero set of φ where no face is, as in the paper (Feng & Crane 2024). With
+        "none", all faces are a sheet: distance is unsigned, and only to what is there, as for clothes.
     lids : {"bent", "flat"}
         Whether lids continue the bend of the surface, or are flat, as for half models, ducts and hulls.
     as_oriented : bool
@@ -232,6 +233,8 @@ def completed(
     if isinstance(shape, Solid):
         return shape
     joined = joined_shape(shape)
+    if options.completion == "none":
+        return _sheet(joined)
     if options.seal is not None and not isinstance(joined, PointCloud):
         return _sealed(joined, options.seal, replace(options, seal=None, as_oriented=True), method, progress)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
@@ -269,6 +272,23 @@ def completed(
     source = joined if isinstance(joined, TriangleMesh) else None
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))
     return replace(solid, source=source, diagnostics=diagnostics)
+
+
+def _sheet(shape: SurfaceShape) -> Solid:
+    """Take all faces of a mesh as they are, as a sheet, which bounds nothing."""
+    if isinstance(shape, PointCloud):
+        raise SourceError(
+            "points are no sheet: what lies between them is completed",
+            remedy="leave out completion, or take distance to the points by scipy.spatial.cKDTree",
+            element="completion",
+        )
+    mesh, owners = shape.triangulation, owners_of(shape)
+    corners = mesh.vertices[mesh.faces]
+    used = face_areas(corners) > 0
+    if not used.any():
+        raise SourceError("all faces of the shape have zero area", element="shape")
+    solid = united([TriangleGroup(corners[used], mesh.faces[used], owners[used], closing=False)], True)
+    return replace(solid, source=shape if isinstance(shape, TriangleMesh) else None)
 
 
 def _sealed(

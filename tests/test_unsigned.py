@@ -1,0 +1,71 @@
+"""Distance to what is there, with nothing completed: open surfaces, and networks of curves on surfaces."""
+
+import numpy as np
+import pytest
+
+import signedheat as sh
+from refusals import refused
+from signedheat import samples
+from signedheat.search.face_tree import FaceTree
+
+
+def skirt(n=48):
+    """A cone without its two ends."""
+    turn = 2 * np.pi * np.arange(n) / n
+    rings = [(r * np.cos(turn), r * np.sin(turn), np.full(n, z)) for r, z in ((0.5, 0.0), (0.3, 0.6))]
+    vertices = np.concatenate([np.stack(ring, axis=1) for ring in rings])
+    low, after = np.arange(n), (np.arange(n) + 1) % n
+    faces = np.concatenate([np.stack([low, after, n + after], axis=1), np.stack([low, n + after, n + low], axis=1)])
+    return sh.TriangleMesh(vertices, faces)
+
+
+def test_distance_to_clothes_is_not_to_what_closes_them():
+    mesh = skirt()
+    cloth = sh.complete(mesh, completion="none")
+    points = np.concatenate([[[0, 0, 0], [0, 0, 0.6]], np.random.default_rng(0).uniform(-1, 1, (500, 3))])
+    exact = FaceTree.of_triangles(mesh.vertices[mesh.faces]).distances(points)
+    assert exact[0] > 0.4  # in the middle of the hem
+    assert cloth.distance(points) == pytest.approx(exact, abs=1e-15)
+    assert not cloth.inside(points).any() and cloth.volume == 0
+    field = sh.signed_distance(mesh, resolution=24, completion="none")
+    assert field.values.min() >= 0
+    assert field(points[:1]) == pytest.approx(exact[:1], abs=1e-12)
+    assert cloth.closest(points).faces.min() >= 0
+    again = samples.union(mesh, mesh)
+    assert sh.complete(again, completion="none").distance(points) == pytest.approx(exact, abs=1e-15)
+
+
+def test_a_ball_as_a_sheet_is_hollow():
+    sheet = sh.complete(samples.sphere(3), completion="none")
+    assert sheet.distance([[0, 0, 0], [2.0, 0, 0]]) == pytest.approx([1, 1], abs=0.02)
+
+
+def network():
+    """Roads with junctions in a square, and the distance of its vertices to them."""
+    n = 33
+    x, y = np.meshgrid(np.linspace(0, 4, n), np.linspace(0, 4, n), indexing="ij")
+    vertices = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
+    corner = (np.arange(n - 1)[:, None] * n + np.arange(n - 1)).ravel()
+    faces = np.concatenate(
+        [np.stack([corner, corner + n, corner + n + 1], axis=1), np.stack([corner, corner + n + 1, corner + 1], axis=1)]
+    )
+    mesh = sh.TriangleMesh(vertices, faces)
+    roads = [[(0.5, 2, 0), (3.5, 2, 0)], [(1.5, 2, 0), (1.5, 3.7, 0)], [(2.6, 0.3, 0), (2.6, 2, 0)]]
+    away = []
+    for a, b in np.array(roads):
+        share = np.clip((vertices - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        away.append(np.linalg.norm(vertices - a - share[:, None] * (b - a), axis=1))
+    return mesh, [mesh.polyline(road) for road in roads], np.min(away, axis=0)
+
+
+def test_distance_to_a_network_of_roads():
+    mesh, roads, exact = network()
+    field = sh.signed_distance(roads, mesh, completion="none")
+    assert field.values == pytest.approx(exact, abs=1e-3)
+    backwards = [road.reversed() for road in roads[::-1]]
+    assert sh.signed_distance(backwards, mesh, completion="none").values == pytest.approx(field.values, abs=1e-9)
+
+
+def test_points_are_no_sheet():
+    with refused(sh.errors.SourceError, element="completion"):
+        sh.complete(sh.PointCloud(samples.sphere(2).vertices), completion="none")
