@@ -28,7 +28,7 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
             raise FileFormatError(f"it is no XML ({error})", remedy="expand macros first: xacro robot.xacro") from error
         if root.tag != "robot":
             raise FileFormatError(f"its root is <{root.tag:.40}>, not <robot>", remedy="name a URDF file")
-        found = {}
+        found: dict[tuple[Path, Scale], None] = {}
         for mesh in root.iter("mesh"):
             name = mesh.get("filename", "")
             scale = parsed_numbers(mesh.get("scale", "1 1 1").split(), "a scale")
@@ -37,7 +37,8 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
                     f"a mesh has the name {name!r:.80} and the scale {mesh.get('scale')!r:.40}",
                     remedy="give a name, and three numbers that are not 0",
                 )
-            found[_located(Path(path), name), tuple(map(float, scale))] = None
+            x, y, z = map(float, scale)
+            found[_located(Path(path), name), (x, y, z)] = None
         if not found:
             raise FileFormatError("it refers to no mesh", remedy="name the meshes themselves")
     return list(found)

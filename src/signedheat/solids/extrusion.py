@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -65,10 +65,11 @@ def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
     """
     height = finite_number(to, "to")
     parts = as_shapes(shape)
-    if parts and all(isinstance(part, Polyline) for part in parts):
-        vertices, faces = _filled(parts)
+    lines = [part for part in parts if isinstance(part, Polyline)]
+    if lines and len(lines) == len(parts):
+        vertices, faces = _filled(lines)
     else:
-        vertices, faces = _sheet(joined_shape(shape), height)
+        vertices, faces = _sheet(joined_shape(cast("Shapes", shape)), height)
     n, rim = len(vertices), boundary(faces)
     tails, heads = rim.T
     foot = vertices.copy()
