@@ -51,7 +51,7 @@ def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
     See Also
     --------
     morphology.thicken : Give a sheet a thickness.
-    signedheat.fill_holes : Close holes, and leave the rest of a mesh as it is.
+    fill_holes : Close holes, and leave the rest of a mesh as it is.
 
     Examples
     --------
