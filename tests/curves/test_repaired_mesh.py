@@ -225,7 +225,7 @@ def test_polygons_have_seams():
     np.testing.assert_allclose(values, expected[quads.ravel()], atol=1e-9)
 
 
-@pytest.mark.parametrize("copies", ["all", "all_turned", "one"])
+@pytest.mark.parametrize("copies", ["all", "all_turned", "one", "without_area"])
 def test_the_method_alone_leaves_copies_out_too(copies):
     mesh = sphere(3)
     circle = 2 * np.pi * np.arange(120) / 120
@@ -235,6 +235,7 @@ def test_the_method_alone_leaves_copies_out_too(copies):
         "all": mesh.faces,
         "all_turned": mesh.faces[:, ::-1],
         "one": far[None],
+        "without_area": far[None, [0, 1, 0]],
     }[copies]
     double = sh.TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, added]))
 

@@ -42,13 +42,12 @@ class RepairedMesh:
     def of(cls, given: object, agree: bool = True) -> RepairedMesh | None:
         """Return a repaired triangle mesh; None if there is nothing to repair, or the shape given is none.
 
-        Faces are turned only if they are to `agree`; if not, faces without area stay unless others are there twice.
+        Faces are turned only if they are to `agree`.
         """
         if not isinstance(given, TriangleMesh):
             return None
         first, n = copied_faces(given.faces, given.n_vertices), given.n_vertices
-        doubled = (given.faces == np.roll(given.faces, 1, axis=1)).any(axis=1)
-        if not agree and (doubled | (first == np.arange(len(first)))).all():
+        if not agree and (first == np.arange(len(first))).all():
             return None
         kept = np.unique(first)
         # beside a copy of its face, a rim looks like an edge of two faces
