@@ -23,7 +23,8 @@ from ..validation import numbers, refuse_extreme
 
 PLANE_ROUNDING = 16.0
 """Distance from a plane up to which a vertex lies in it, in last places of the largest coordinate: what rounding of
-coordinates and of their product with the normal makes. Of turned boxes cut along their sides, 8 to 64 are right."""
+coordinates and of their product with the normal makes. Of 120 turned boxes that were cut along their sides, 15 are
+wrong with 0.5, 2 with 1 and none with 2 or more."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
