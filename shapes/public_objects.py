@@ -67,7 +67,12 @@ def curve_on(surface: sh.PolygonMesh | sh.PointCloud | sh.DigitalSurface) -> sh.
     return surface.path([0, 1])
 
 
-def banded() -> sh.GridField:
+def jumping() -> sh.Field[sh.results.CutSurface]:
+    """A field that jumps across a cut of the surface."""
+    return sh.piecewise_distance(BALL.path([0, 5]), BALL)
+
+
+def banded() -> sh.Field[sh.Grid]:
     """A band after use: its trees are there."""
     band = sh.signed_distance(samples.without_patches(samples.sphere(2), 2, 0.2), resolution=24, band=0.3)
     assert band.offset(0.1).n_faces and band.closest([[1.2, 0.0, 0.0]]).distances.shape == (1,)
@@ -116,12 +121,16 @@ OBJECTS: dict[str, Callable[[], object]] = {
     "tet field": lambda: sh.SignedHeatSolver(BOX).distance(INNER),
     "grid field": lambda: sh.SignedHeatSolver(grid()).distance(BALL),
     "solid": lambda: sh.signed_distance(BALL, resolution=16),
-    "piecewise field": lambda: sh.piecewise_distance(BALL.path([0, 5]), BALL),
+    "piecewise field": lambda: jumping(),
     "orientation": lambda: sh.orientation(BALL),
     "deviation": lambda: sh.deviation(samples.sphere(1, 1.1), BALL),
     "completed solid": lambda: sh.complete(samples.without_patches(samples.sphere(2), 2, 0.2)),
     "closest": lambda: sh.complete(samples.sphere(2)).closest([[0.5, 0.0, 0.0]]),
     "band": lambda: banded(),
+    "band of nodes": lambda: banded().domain,
+    "section": lambda: sh.complete(BALL).section([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]),
+    "cut surface": lambda: jumping().domain,
+    "cut": lambda: jumping().domain.cuts(jumping().values)[0],
     "samples": lambda: sh.sample_distances(sh.signed_distance(BALL, resolution=16), 20),
     "curve orientation": lambda: sh.orientation(RING, BALL),
     "labels": lambda: sh.io.LabelImage(np.arange(8).reshape(2, 2, 2), np.eye(3), np.zeros(3)),

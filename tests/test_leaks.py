@@ -97,7 +97,7 @@ def test_factors_are_freed_with_their_solver(monkeypatch):
         made.append(weakref.ref(factor))
         return factor
 
-    for module in ("direct_integration", "surfaces.surface_discretization", "surfaces.vector_heat"):
+    for module in ("linear.direct_integration", "surfaces.surface_discretization", "surfaces.vector_heat"):
         monkeypatch.setattr(f"signedheat.{module}.factorize", watched)
     ball = samples.sphere(1)
     solver = sh.SignedHeatSolver(ball)

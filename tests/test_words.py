@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from signedheat import diagnostics
-from signedheat.arrays import Sentence, counted, percent
+from signedheat.errors import Sentence, counted, percent
 
 
 @pytest.mark.parametrize("share", [0.0, 1e-12, 1e-5, 0.004999, 0.12345, 0.9994, 0.99951, 0.999999, 1.0, 1.5, 123.0])

@@ -8,7 +8,8 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from .arrays import Frozen, Ints, Sentence, ShortRepr, percent
+from .arrays import Frozen, Ints, ShortRepr
+from .errors import Sentence, percent
 
 SMALL_SHARE = 0.005
 """Fraction of the surface up to which its completion, and parts that bound nothing or that a contour misses, are not

@@ -12,7 +12,7 @@ from typing import Literal, Protocol, TypeAlias, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arrays import Floats, counted
+from .arrays import Floats
 from .distances import signed_distance
 from .errors import (
     InexactWarning,
@@ -20,6 +20,7 @@ from .errors import (
     SignedHeatError,
     SourceError,
     UnsupportedTypeError,
+    counted,
     warn_user,
 )
 from .fields.blends import smooth_difference, smooth_intersection, smooth_union

@@ -40,7 +40,9 @@ def test_the_crease_between_two_balls_has_no_teeth(field):
     made = field.contour(0.3)
     grid = field.domain
     points, faces = closed_surface(field.values, grid.spacing, 0.3)
-    toothed = sh.TriangleMesh(on_level(field.solid.distance, points, field.values, grid, 0.3), faces)
+    toothed = sh.TriangleMesh(
+        on_level(field.solid.distance, points, field.values, grid.origin, grid.spacing, 0.3), faces
+    )
     assert np.array_equal(toothed.vertices, made.vertices)
     exact = 2 * np.pi * np.sqrt(1.3**2 - 1.1**2) * 2 * np.arcsin(1.1 / 1.3)
     before, after = (bends(mesh)[sharp(mesh)].sum() / exact for mesh in (toothed, made))

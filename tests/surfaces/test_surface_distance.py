@@ -391,7 +391,7 @@ def test_the_pages_of_a_book(pages, constraint):
 
 
 def test_nothing_is_factorised_twice(monkeypatch):
-    from signedheat import direct_integration
+    from signedheat.linear import direct_integration
     from signedheat.surfaces import surface_discretization as surface
     from signedheat.surfaces import vector_heat
 

@@ -12,8 +12,7 @@ from typing import Any
 
 import signedheat as sh
 
-from ..arrays import counted, percent
-from ..errors import SignedHeatError, SourceError, printable
+from ..errors import SignedHeatError, SourceError, counted, percent, printable
 from ..jobs import MOST_THREADS
 from .late_imports import files, inputs, pool, shape_files
 from .late_imports import operands as shapes

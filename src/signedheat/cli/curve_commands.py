@@ -7,8 +7,7 @@ from typing import Any, Literal
 
 import signedheat as sh
 
-from ..arrays import counted, percent
-from ..errors import SourceError, printable
+from ..errors import SourceError, counted, percent, printable
 from .late_imports import curve_completion as closing
 from .late_imports import curve_distance as distance
 from .late_imports import diagnostics, numpy

@@ -14,11 +14,11 @@ import numpy as np
 
 import signedheat as sh
 
-from ..arrays import Floats, counted, percent
+from ..arrays import Floats
 from ..constraints import Constraint
 from ..diagnostics import Diagnostics, SampledSource
 from ..distances import grid_around, measured_distance
-from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, printable
+from ..errors import FileFormatError, GeometryError, SignedHeatError, SourceError, counted, percent, printable
 from ..grids.grid import RESOLUTION
 from ..io.field_files import VALUE_FORMATS, save_with_values
 from ..io.files import contents, distinct_names, extension

@@ -543,5 +543,5 @@ def refuse_contradictions(arguments: Namespace) -> None:
         if isinstance(numbers, list) and len(numbers) not in counts:
             error(f"argument {name}: {' or '.join(map(str, counts))} numbers, not {len(numbers)}")
     own_grid = (arguments.origin, arguments.spacing, arguments.grid_shape)
-    if (arguments.origin, arguments.grid_shape) != (None, None) and None in own_grid:
+    if "--spacing" in declared and own_grid[::2] != (None, None) and None in own_grid:
         error("a custom grid needs all of --origin, --spacing and --shape")

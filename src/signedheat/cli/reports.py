@@ -13,8 +13,7 @@ import numpy as np
 
 import signedheat as sh
 
-from ..arrays import counted, percent
-from ..errors import SourceError, printable
+from ..errors import SourceError, counted, percent, printable
 from ..geodesics.shortest_paths import gaps
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
 from ..io import read

@@ -11,8 +11,7 @@ from typing import Any
 
 import signedheat as sh
 
-from ..arrays import Sentence, counted, percent
-from ..errors import printable
+from ..errors import Sentence, counted, percent, printable
 from ..packages import require
 from .late_imports import operands as shapes
 from .options import (

@@ -14,8 +14,7 @@ from typing import Any
 
 import signedheat as sh
 
-from ..arrays import counted, percent
-from ..errors import FileFormatError, MissingPackageError, SignedHeatError, printable
+from ..errors import FileFormatError, MissingPackageError, SignedHeatError, counted, percent, printable
 from ..jobs import run_limited
 from .late_imports import inputs, inspection, reports, samples, windows
 from .late_imports import operands as shapes

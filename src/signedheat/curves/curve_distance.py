@@ -11,10 +11,10 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from ..arrays import Bools, Ints, percent
+from ..arrays import Bools, Ints
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..diagnostics import Note
-from ..errors import ConstraintError, InexactWarning, warn_user
+from ..errors import ConstraintError, InexactWarning, percent, warn_user
 from ..fields.field import Field
 from ..fields.sharpening import sharpen
 from ..jobs import Progress

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Frozen, Ints, counted, mask_of
-from ..errors import GeometryError
+from ..arrays import Bools, Floats, Frozen, Ints, mask_of
+from ..errors import GeometryError, counted
 from ..fields.field_domain import Exact
 from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs, split_corners
 from ..mesh.polylines import assemble_polylines

@@ -15,9 +15,17 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import Bools, Complexes, Floats, counted
+from ..arrays import Bools, Complexes, Floats
 from ..diagnostics import Diagnostics, Jumps
-from ..errors import GeometryError, InexactWarning, SourceError, UnreachedWarning, UnsupportedTypeError, warn_user
+from ..errors import (
+    GeometryError,
+    InexactWarning,
+    SourceError,
+    UnreachedWarning,
+    UnsupportedTypeError,
+    counted,
+    warn_user,
+)
 from ..fields.field import Field
 from ..jobs import Progress, Stopwatch, within
 from ..linear import chosen_backend

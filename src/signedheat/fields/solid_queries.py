@@ -8,7 +8,8 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Ints, counted
+from ..arrays import Bools, Floats, Ints
+from ..errors import counted
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Floats, Ints, counted
-from ..errors import GeometryError, OutsideError
+from ..arrays import Floats, Ints
+from ..errors import GeometryError, OutsideError, counted
 from ..fields.field_domain import Exact, FieldDomain
 from ..mesh.triangles import flipped_along_creases
 from ..surfaces.triangle_mesh import TriangleMesh

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, counted
-from ..errors import GeometryError
+from ..arrays import Floats, Frozen
+from ..errors import GeometryError, counted
 from ..packages import lazy_module
 from ..shapes.exchange import Displayed
 from ..validation import boolean, coordinates, flag, numbers, positive_steps

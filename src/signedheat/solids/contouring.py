@@ -19,9 +19,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints, mask_of, percent
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import SMALL_SHARE
-from ..errors import InexactWarning, MemoryLimitError, OutsideError, warn_user
+from ..errors import InexactWarning, MemoryLimitError, OutsideError, percent, warn_user
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
 from ..grids.exact_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.grid import Grid

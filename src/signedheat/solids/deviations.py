@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints, counted
-from ..errors import SourceError
+from ..arrays import Bools, Floats, Frozen, Ints
+from ..errors import SourceError, counted
 from ..jobs import Progress
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats, counted
-from ..errors import GeometryError, OutsideError, SignedHeatError
+from ..arrays import Bools, Floats
+from ..errors import GeometryError, OutsideError, SignedHeatError, counted
 from ..grids.exact_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.grid_discretization import refuse_large_grid

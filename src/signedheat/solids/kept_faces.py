@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints, counted
-from ..errors import GeometryError
+from ..arrays import Bools, Floats, Ints
+from ..errors import GeometryError, counted
 from ..grids.grid import RESOLUTION, Grid
 from ..jobs import Progress
 from ..mesh.arrangement import SAME_POINT, arranged, meeting_faces

@@ -9,9 +9,9 @@ from typing import Literal, TypeAlias, cast
 
 import numpy as np
 
-from ..arrays import Floats, Ints, counted
+from ..arrays import Floats, Ints
 from ..compiled import compiled
-from ..errors import SignedHeatError, SourceError
+from ..errors import SignedHeatError, SourceError, counted
 from ..grids.grid import Grid
 from ..mesh.box_tree import BOXES_PER_LEAF
 from ..mesh.unit_vectors import SAME_WAY, unit

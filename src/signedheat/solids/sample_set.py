@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any, Literal
 
-from ..arrays import Bools, Floats, counted
+from ..arrays import Bools, Floats
+from ..errors import counted
 from ..packages import lazy_module
 
 files: Any = lazy_module("signedheat.io.shape_files", "files")

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, Ints, counted
-from ..errors import GeometryError
+from ..arrays import Floats, Frozen, Ints
+from ..errors import GeometryError, counted
 from ..grids.polyline import Polyline
 from ..mesh.components import numbered
 from ..mesh.edges import edge_table

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints, counted, percent, short
+from ..arrays import Bools, Floats, Frozen, Ints, short
 from ..diagnostics import CompletedArea, Diagnostics, Note
-from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
+from ..errors import InexactWarning, SourceError, UnsupportedTypeError, counted, percent, warn_user
 from ..fields.field import Field
 from ..fields.solid_queries import Closest
 from ..grids.band import Band

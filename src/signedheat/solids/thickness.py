@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, Ints, counted
+from ..arrays import Floats, Frozen, Ints
 from ..compiled import compiled
-from ..errors import SourceError
+from ..errors import SourceError, counted
 from ..memory import refuse_beyond_memory
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.components import connected_components, sums_of

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Frozen, counted
-from ..errors import GeometryError
+from ..arrays import Bools, Floats, Frozen
+from ..errors import GeometryError, counted
 from ..mesh.edges import edge_table
 from ..mesh.welding import same_positions
 from ..search.face_tree import NearestFaces

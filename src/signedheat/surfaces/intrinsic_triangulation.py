@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats, Frozen, Ints, counted
-from ..errors import GeometryError
+from ..arrays import Bools, Floats, Frozen, Ints
+from ..errors import GeometryError, counted
 from ..fields.field_domain import Exact
 from ..jobs import Progress, Stopwatch, within
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes

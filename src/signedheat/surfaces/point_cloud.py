@@ -19,9 +19,9 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats, Ints, counted, percent
+from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..errors import GeometryError, InexactWarning, warn_user
+from ..errors import GeometryError, InexactWarning, counted, percent, warn_user
 from ..jobs import interruptible
 from ..mesh.signed_graph import Links, signs_of
 from ..mesh.unit_vectors import SAME_WAY, unit

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Ints, counted, mask_of
-from ..errors import GeometryError
+from ..arrays import Bools, Floats, Ints, mask_of
+from ..errors import GeometryError, counted
 from ..mesh.components import next_in_groups, sums_of
 from ..mesh.triangles import area_vectors, cut_into_ears
 from ..shapes.exchange import Elements, Exchangeable

@@ -9,8 +9,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Frozen, Ints, counted
-from ..errors import SourceError
+from ..arrays import Floats, Frozen, Ints
+from ..errors import SourceError, counted
 from ..validation import array_of, finite_rows, flag, frozen, whole_numbers
 
 

@@ -11,10 +11,10 @@ from itertools import chain
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints, mask_of, percent
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import GeodesicWindows, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
-from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
+from ..errors import InexactWarning, SourceError, UnsupportedTypeError, percent, warn_user
 from ..fields.field import Field
 from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares, zero_line

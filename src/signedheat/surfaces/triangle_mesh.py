@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Floats, Ints, counted
-from ..errors import GeometryError
+from ..arrays import Floats, Ints
+from ..errors import GeometryError, counted
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
 from ..mesh.triangles import area_vectors

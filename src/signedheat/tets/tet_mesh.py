@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Floats, Frozen, Ints, counted
-from ..errors import GeometryError
+from ..arrays import Floats, Frozen, Ints
+from ..errors import GeometryError, counted
 from ..fields.field_domain import Exact, FieldDomain
 from ..mesh.components import element_components
 from ..mesh.tet_shapes import FaceTable, Tetrahedra, signed_volumes
