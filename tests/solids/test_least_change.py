@@ -235,3 +235,15 @@ def test_winding_numbers_that_the_completion_overrules_are_counted():
     solid = sh.complete(ball())
     assert overruled(solid, solid.triangles) == 0
     assert overruled(solid, solid.triangles[:, ::-1]) == pytest.approx(np.pi / 6, rel=0.1)  # of the box around it
+
+
+@pytest.mark.parametrize("seed", [0, 143])
+def test_copies_of_which_each_lies_within_the_other_are_one_body(seed):
+    angles, i = 2 * np.pi * np.arange(24) / 24, np.arange(24)
+    circle = np.stack([0.7 * np.cos(angles), 0.7 * np.sin(angles), 0 * angles], axis=1)
+    vertices = np.concatenate([circle, [[0, 0, 0], [0, 0, 1.5]]])
+    sides = np.stack([i, np.roll(i, -1), np.full(24, 25)], axis=1)
+    base = np.stack([np.roll(i, -1), i, np.full(24, 24)], axis=1)
+    cone = vertices, np.concatenate([sides, base])
+    copy = vertices + 1e-8 * np.random.default_rng(seed).normal(size=vertices.shape), cone[1]
+    assert volume(joined(cone, copy)) == pytest.approx(volume(cone), rel=1e-6)

@@ -273,7 +273,7 @@ def _nested(
     np.minimum.at(depth, probes, np.round(around))
     depth = np.where(closed & np.isfinite(depth), depth, 0.0)
     inner = closed & (depth > 0)
-    if not inner.any():
+    if not inner.any() or not (depth[owners] <= 0).any():  # of copies a rounding apart, each may lie within the other
         return outward, 0, 0
     given = np.bincount(pieces, np.sign(counts) * np.sign(chain.multiplicities) * chain.areas, n)
     clear = np.abs(given) >= HINT * np.bincount(pieces, chain.areas, n)
