@@ -28,8 +28,8 @@ manifold3d: Any = lazy_module("manifold3d", "triangles of outlines")
 def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
     """Extrude a sheet, or outlines in the plane, along z to a plane, as a closed mesh with upright walls.
 
-    Terrain and reliefs get a base below them or above. Outlines lie at z = 0; those within others are holes. Faces of
-    a sheet are kept as they are.
+    Terrain and reliefs get a base below them or above. Outlines lie at z = 0; holes run the other way, as those of
+    polygons do. Faces of a sheet are kept as they are.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
     Examples
     --------
     >>> from signedheat import Polyline, TriangleMesh
-    >>> plate = [[0, 0], [4, 0], [4, 4], [0, 4]], [[1, 1], [2, 1], [2, 2], [1, 2]]
+    >>> plate = [[0, 0], [4, 0], [4, 4], [0, 4]], [[1, 1], [1, 2], [2, 2], [2, 1]]
     >>> round(extrude([Polyline(line, closed=True) for line in plate], 2.0).volume, 9)
     30.0
     >>> roof = TriangleMesh([[0, 0, 1], [1, 0, 1], [1, 1, 2], [0, 1, 2]], [[0, 1, 2], [0, 2, 3]])
