@@ -91,7 +91,8 @@ CELLS_PER_POINT_GAP = 2.0
 NOISE_RANGE = (1e-6, 0.75)
 """Range of distances between corners that noise has separated, relative to the square root of their triangle's area."""
 CELLS_PER_FACE = 8.0
-"""Cells of the zero set of φ are at least as wide as the loose faces over this number."""
+"""Cells of the zero set of φ are at least as wide as the loose faces over this number. With 16 or 32, volumes of four
+soups of 80 to 1280 faces change by 0.02 %, and there are up to four times as many faces; with 4, by 0.16 %."""
 TORN_LEVEL = 0.2
 """Loose pieces are completed by heat below this level, where a fifth to two fifths of a body are left, else by lids,
 which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose 0.1 % too little and
@@ -107,7 +108,8 @@ CLEAR_WINDING, EVIDENCE_PLACES = 0.9, 1000
 """Winding numbers of faces say clearly what is inside above this, and what is outside below one minus this; and number
 of places in the box of a solid at which they are asked."""
 MOST_OVERRULED = 0.02
-"""Where the completion overrules clear winding numbers at more than this share of the places, a warning says so."""
+"""Where the completion overrules clear winding numbers at more than this share of the places, a warning says so. Of 570
+shapes that were changed a little, the most is 0.01; a bowl that is closed as a hollow ball has 0.04."""
 
 Completing = Literal["lids", "heat", "none"]
 Lids = Literal["bent", "flat"]
