@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import pytest
 
 from shapes import small_runs
 from signedheat.compiled import compiled
+from signedheat.jobs import Announcement
 
 
 def test_the_same_values_without_compiling(tmp_path):
@@ -64,6 +66,19 @@ mesh.edges, mesh.places"""
     for wanted in (1, 0):  # compiled, then read from the cache
         done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
         assert done.stderr.count("signedheat: compiling what this needs") == wanted and done.stdout == ""
+
+
+@pytest.mark.parametrize("fault", [OSError("no space is left"), BrokenPipeError(), ValueError("a closed file")])
+def test_announcements_break_no_call_where_nobody_can_read_them(monkeypatch, fault):
+    class Full(io.StringIO):
+        def write(self, text):
+            raise fault
+
+    monkeypatch.setattr(sys, "stderr", Full())
+    announce = Announcement("compiling", everywhere=True)
+    monkeypatch.setattr(Announcement, "are_wanted", True)
+    announce()
+    assert announce.is_made
 
 
 def test_kernels_are_compiled_once():

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeout
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from threading import Thread
@@ -47,10 +47,11 @@ class Announcement:
             return
         self.is_made = True
         logger.info(self._text)
-        is_terminal = sys.stderr is not None and sys.stderr.isatty()
-        if self.are_wanted and sys.stderr and (self._everywhere or is_terminal or "ipykernel" in sys.modules):
-            sys.stderr.write(f"{CLEAR_LINE if is_terminal else ''}signedheat: {self._text}\n")
-            sys.stderr.flush()
+        with suppress(OSError, ValueError):  # standard error is full, or closed
+            is_terminal = sys.stderr is not None and sys.stderr.isatty()
+            if self.are_wanted and sys.stderr and (self._everywhere or is_terminal or "ipykernel" in sys.modules):
+                sys.stderr.write(f"{CLEAR_LINE if is_terminal else ''}signedheat: {self._text}\n")
+                sys.stderr.flush()
 
 
 class Stopwatch:
