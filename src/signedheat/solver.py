@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import groupby
 from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, overload
 
-from .arrays import Frozen, Ints
+from .arrays import Frozen, Ints, LastUsed
 from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
@@ -100,6 +100,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     diffusion: Diffusion | None = None
     progress: Progress | None = field(default=None, repr=False)
     intrinsic: bool | Literal["auto"] = "auto"
+    _made: LastUsed[None, Adaptable] = field(default_factory=LastUsed, init=False, repr=False)
 
     def __post_init__(self) -> None:
         refuse_pair_apart((self.domain, self.diffusion), "SignedHeatSolver")
@@ -111,9 +112,12 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
         checked_intrinsic(self.intrinsic)
 
-    @cached_property
+    @property
     def discretization(self) -> Adaptable:
         """The discretisation of the domain."""
+        return self._made(None, self._discretized)
+
+    def _discretized(self) -> Adaptable:
         report = within(self.progress, 0.2, 0.4)
         if self.intrinsic == "auto":
             return lowered_by_angles(self.domain, report)
@@ -139,9 +143,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         >>> solver.with_diffusion(4.0).discretization is solver.discretization
         True
         """
-        other = replace(self, diffusion=diffusion)
-        other.__dict__["discretization"] = self.discretization
-        return other
+        return with_discretization(replace(self, diffusion=diffusion), self.discretization)
 
     @overload
     def distance(
@@ -317,6 +319,13 @@ def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constrain
 def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constraint: Constraint | None) -> Field:
     """Compute `SignedHeatSolver.distance` without warning of small curves, for callers that then measure exactly."""
     return solver._distance(sources, constraint)
+
+
+def with_discretization(solver: SignedHeatSolver[AnyDomain], made: Adaptable) -> SignedHeatSolver[AnyDomain]:
+    """Return a solver as this one that uses a discretisation made before."""
+    other = replace(solver)
+    other._made(None, lambda: made)
+    return other
 
 
 def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any], names: Ints) -> None:

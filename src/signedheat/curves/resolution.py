@@ -12,7 +12,7 @@ from ..errors import CancellingNormalsError, GeometryError, SourceError
 from ..jobs import Progress, within
 from ..shapes.foreign import as_list
 from ..shapes.kinds import SurfaceDomain
-from ..solver import SignedHeatSolver
+from ..solver import SignedHeatSolver, with_discretization
 from ..surfaces.extrapolation import Diffusion
 from ..surfaces.intrinsic_discretization import Retriangulated, RetriangulatedForZeroSet
 from ..surfaces.source_segments import CurveGroups
@@ -64,9 +64,7 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
     made = solver.discretization
     if not isinstance(made, Retriangulated):
         return solver
-    once = replace(solver)
-    once.__dict__["discretization"] = made.adapt(curves)[0]
-    return once
+    return with_discretization(solver, made.adapt(curves)[0])
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
@@ -90,5 +88,4 @@ def for_zero_set(
 ) -> SignedHeatSolver[TriangleMesh]:
     """Return a solver with ``intrinsic=True`` and diffusion times that suit the pieces, however small they are."""
     solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
-    solver.__dict__["discretization"] = RetriangulatedForZeroSet(mesh, within(progress, 0.2, 0.4))
-    return solver
+    return with_discretization(solver, RetriangulatedForZeroSet(mesh, within(progress, 0.2, 0.4)))

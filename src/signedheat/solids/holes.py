@@ -46,6 +46,9 @@ class Filled:
     filled: Rims
     left: Rims
 
+    def _note(self, origins: Ints, filled: Rims, left: Rims) -> None:
+        vars(self).update(origins=origins, filled=filled, left=left)
+
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledMesh(Filled, TriangleMesh):
@@ -168,7 +171,7 @@ def fill_holes(
         made = FilledPolygonMesh(points, [*given.polygons, *added])
     else:
         made = FilledMesh(points, np.concatenate([given.faces, added]))
-    vars(made).update(origins=np.append(np.arange(n), np.full(len(added), -1)), filled=filled, left=left)
+    made._note(np.append(np.arange(n), np.full(len(added), -1)), filled, left)
     return made
 
 

@@ -70,7 +70,8 @@ class RetriangulatedForZeroSet(Retriangulated):
         areas = surface.triangles.face_areas[np.concatenate([part.faces for part in parts])]
         lengths = np.concatenate([part.lengths for part in parts])
         own = 0.5 * float(np.average(np.sqrt(4 / 3**0.5 * areas), weights=lengths))
-        return replace(surface, spacing=min(surface.spacing, max(SHARE_OF_PIECE * scales.min(), own))), groups
+        smaller = min(surface.spacing, max(SHARE_OF_PIECE * scales.min(), own))
+        return replace(surface, spacing=smaller, unturned=None), groups
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:

@@ -47,6 +47,9 @@ class SurfaceDiscretization:
     triangulation: IntrinsicTriangulation | None = None  # of the domain; the field on it is kept, too
     spacing: float = math.nan  # h: by default half the mean edge length, the distance between midpoints of edges
     notes: tuple[Note, ...] = ()  # on repairs made in building the triangles, for the diagnostics of every field
+    # the same but for first faces at nonmanifold edges, on which step 3 does not depend; whatever has other triangles
+    # or another spacing has none
+    unturned: SurfaceDiscretization | None = None
     # by diffusion time, of which there is a second one where curves end
     _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(2), init=False, repr=False)
     _turned: LastUsed[bytes, SurfaceDiscretization] = field(default_factory=LastUsed, init=False, repr=False)
@@ -64,18 +67,20 @@ class SurfaceDiscretization:
     @cached_property
     def integration(self) -> SurfaceIntegration:
         """Step 3 of the method, which integrates the directions to φ."""
+        if self.unturned is not None:
+            return self.unturned.integration
         ordered = partial(factorize, order=self.vertex_order)
         return SurfaceIntegration(self.stiffness, factorize=ordered, strength=SURFACE_SPRINGS / self.spacing)
 
     @cached_property
     def stiffness(self) -> sparse.csr_matrix:
         """Upper triangle of C (Eq. 10), on the vertices of the triangles."""
-        return cotan_matrix(self.triangles)
+        return cotan_matrix(self.triangles) if self.unturned is None else self.unturned.stiffness
 
     @cached_property
     def vertex_order(self) -> Ints:
         """Fill-reducing order of the vertices, from which that of the edges follows."""
-        return elimination_order(self.stiffness)
+        return elimination_order(self.stiffness) if self.unturned is None else self.unturned.vertex_order
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
@@ -83,7 +88,7 @@ class SurfaceDiscretization:
         surface = self
         if triangles is not self.triangles:  # the present vertices come first in them
             notes = *self.notes, VerticesAdded(triangles.n_vertices - self.triangles.n_vertices)
-            surface = replace(self, triangles=triangles, transfer=None, notes=notes)
+            surface = replace(self, triangles=triangles, transfer=None, notes=notes, unturned=None)
         triangles, groups = nonmanifold_frames(triangles, segments)
         return surface._turned_to(triangles), groups
 
@@ -101,12 +106,8 @@ class SurfaceDiscretization:
         if triangles is self.triangles:
             return self
 
-        def turned() -> SurfaceDiscretization:
-            other = replace(self, triangles=triangles)
-            vars(other).update({name: getattr(self, name) for name in ("stiffness", "integration", "vertex_order")})
-            return other
-
-        return self._turned(fingerprint(triangles.first_halfedges), turned)
+        key = fingerprint(triangles.first_halfedges)
+        return self._turned(key, lambda: replace(self, triangles=triangles, unturned=self))
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
         """Compute X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
