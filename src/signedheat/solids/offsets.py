@@ -13,7 +13,6 @@ from ..arrays import Floats, Ints
 from ..compiled import compiled
 from ..errors import SignedHeatError, SourceError, counted
 from ..grids.grid import Grid
-from ..mesh.box_tree import BOXES_PER_LEAF
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..mesh.welding import indexed
 from ..parallel import in_chunks
@@ -101,7 +100,8 @@ class Offset:
         slack = MEETING_DISTANCE * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
         def part(rows: Floats) -> tuple[Floats, Ints]:
-            return _steepest(features.rows, tree.bounds, tree.items, self._normals, rows, slack)
+            starts, faces = tree.meeting(np.repeat(rows[:, None, :3], 3, axis=1), slack)
+            return _steepest(features.rows, starts, faces, self._normals, rows, slack)
 
         above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
         beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # heights above the ball that cuts off corners
@@ -144,35 +144,23 @@ def checked_reach(reach: Reach) -> Reach:
 
 @compiled
 def _steepest(
-    rows: Floats, bounds: Floats, items: Ints, normals: Floats, places: Floats, slack: float
+    rows: Floats, starts: Ints, faces: Ints, normals: Floats, places: Floats, slack: float
 ) -> tuple[Floats, Ints]:
-    """Find (n,) the triangle at each place above whose plane its point is highest, or −1; and this height."""
-    heights, faces = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
-    leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
+    """Find (n,) the triangle at each place above whose plane its point is highest, or −1; and this height.
+
+    Near place p are the triangles ``faces[starts[p]:starts[p + 1]]``.
+    """
+    heights, steepest = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
     for p in range(len(places)):
-        x, y, z = places[p, 0], places[p, 1], places[p, 2]
-        stack[0], depth = 1, 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            apart = False
-            for d in range(3):
-                apart |= bounds[node, d] > places[p, d] + slack or bounds[node, 3 + d] < places[p, d] - slack
-            if apart:
+        for k in range(starts[p], starts[p + 1]):
+            f = faces[k]
+            if normals[f, 0] == 0.0 and normals[f, 1] == 0.0 and normals[f, 2] == 0.0:
                 continue
-            if node < leaves:
-                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
-                depth += 2
-                continue
-            for k in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
-                f = items[k]
-                if f < 0 or (normals[f, 0] == 0.0 and normals[f, 1] == 0.0 and normals[f, 2] == 0.0):
-                    continue
-                if foot_on_triangle(rows, f, x, y, z)[0] <= slack * slack:
-                    height = normals[f, 0] * places[p, 3] + normals[f, 1] * places[p, 4] + normals[f, 2] * places[p, 5]
-                    if height > heights[p]:
-                        heights[p], faces[p] = height, f
-    return heights, faces
+            if foot_on_triangle(rows, f, places[p, 0], places[p, 1], places[p, 2])[0] <= slack * slack:
+                height = normals[f, 0] * places[p, 3] + normals[f, 1] * places[p, 4] + normals[f, 2] * places[p, 5]
+                if height > heights[p]:
+                    heights[p], steepest[p] = height, f
+    return heights, steepest
 
 
 OFF_SYMMETRY = 1e-7
