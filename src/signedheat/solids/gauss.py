@@ -17,10 +17,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 from scipy import sparse
 
 from ..arrays import Bools, Floats, Frozen, Ints
@@ -307,7 +308,7 @@ class Dipoles:
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
         known = self.places, self.softening, vectors, self.tree.items, self.balls, nodes
-        return self._at_places(lambda at: _potentials(*known, at, PLACES_TOGETHER)) / (4.0 * np.pi)
+        return self._at_places(partial(_potentials, *known)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) zeros, for the levels at the places due to their own group only: loose triangles have none."""
@@ -319,16 +320,21 @@ class Dipoles:
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
         known = self.places, self.softening, charges, self.tree.items, self.balls, nodes
-        field = self._at_places(lambda at: _fields(*known, at, PLACES_TOGETHER))
+        field = self._at_places(partial(_fields, *known))
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
         return np.bincount(self.owners, flux).astype(np.float64)
 
-    def _at_places(self, function: Callable[[Ints], Floats]) -> Floats:
-        """(n, ...) values of a function of ids of places, called in the order of the tree: neighbours use the same."""
+    @cached_property
+    def _listed(self) -> tuple[Ints, Ints, NDArray[np.int32]]:
+        """Places in the order of the tree, and the nodes that count for each `PLACES_TOGETHER` of them: see `_list`."""
         order = self.tree.items[self.tree.items >= 0]
-        (found,) = in_chunks(lambda at: (function(at),), order)
+        return order, *_list(self.places[order], self.balls, PLACES_TOGETHER)
+
+    def _at_places(self, kernel: Callable[..., Floats]) -> Floats:
+        """(n, ...) values of a kernel of rows of the order of the tree, where neighbours have the same nodes."""
+        (found,) = in_chunks(lambda rows: (kernel(*self._listed, rows, PLACES_TOGETHER),), np.arange(len(self.places)))
         values = np.empty_like(found)
-        values[order] = found
+        values[self._listed[0]] = found
         return values
 
     def _sums(self, values: Floats) -> Floats:
@@ -374,6 +380,36 @@ def spacing(places: Floats) -> Floats:
 
 
 @compiled
+def _list(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
+    """List the nodes whose dipoles, in place of their boxes', count for each `together` places, and where lists begin.
+
+    Nodes that all of the places are beyond are one dipole. Of leaves near some of them, minus the number is listed.
+    """
+    leaves, stack, count = len(balls) // 2, np.empty(64, dtype=np.int64), 0
+    starts, nodes = np.zeros(-(-len(places) // together) + 1, dtype=np.int64), np.empty(leaves, dtype=np.int32)
+    for begin in range(0, len(places), together):
+        if count + leaves > len(nodes):
+            more = np.empty(2 * len(nodes) + leaves, dtype=np.int32)
+            more[:count] = nodes[:count]
+            nodes = more
+        stack[0], depth = 1, 1
+        while depth > 0:
+            depth -= 1
+            node, near = stack[depth], 0
+            for p in range(begin, min(begin + together, len(places))):
+                dx, dy, dz = balls[node, 0] - places[p, 0], balls[node, 1] - places[p, 1], balls[node, 2] - places[p, 2]
+                near += 1 if dx * dx + dy * dy + dz * dz <= balls[node, 3] else 0
+            if near > 0 and node < leaves:
+                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
+                depth += 2
+            else:
+                nodes[count] = -node if near > 0 else node
+                count += 1
+        starts[begin // together + 1] = count
+    return starts, nodes[:count]
+
+
+@compiled
 def _potentials(
     places: Floats,
     softening: Floats,
@@ -381,35 +417,33 @@ def _potentials(
     items: Ints,
     balls: Floats,
     nodes: Floats,
-    at: Ints,
+    order: Ints,
+    starts: Ints,
+    listed: NDArray[np.int32],
+    rows: Ints,
     together: int,
 ) -> Floats:
     """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all other dipoles v, where d points from the place to v.
 
-    Consecutive places descend the tree together, as many as `together` says.
+    The places are rows of `order`, from a multiple of `together` on; `listed` has the nodes that count: see `_list`.
     """
-    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.empty(len(at))
+    leaves, result = len(balls) // 2, np.empty(len(rows))
     x, y, z, sums = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
-    for begin in range(0, len(at), together):
+    for begin in range(0, len(rows), together):
         for k in range(together):
-            p = at[min(begin + k, len(at) - 1)]
+            p = order[rows[min(begin + k, len(rows) - 1)]]
             x[k], y[k], z[k], sums[k] = places[p, 0], places[p, 1], places[p, 2], 0.0
-        stack[0], depth = 1, 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            ax, ay, az, beyond = balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3]
-            if _all_beyond(ax, ay, az, beyond, x, y, z):
+        group = rows[begin] // together
+        for node in listed[starts[group] : starts[group + 1]]:
+            if node > 0:
+                ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
                 vx, vy, vz = nodes[node, 0], nodes[node, 1], nodes[node, 2]
                 for k in range(together):
                     dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
                     square = dx * dx + dy * dy + dz * dz
                     sums[k] += (dx * vx + dy * vy + dz * vz) / (square * np.sqrt(square))
-            elif node < leaves:
-                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
-                depth += 2
             else:
-                for item in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
+                for item in range((-node - leaves) * BOXES_PER_LEAF, (-node - leaves + 1) * BOXES_PER_LEAF):
                     e = items[item]
                     if e < 0:
                         continue
@@ -420,19 +454,9 @@ def _potentials(
                         square = dx * dx + dy * dy + dz * dz + soft
                         square = square if square > 0.0 else 1.0
                         sums[k] += (dx * vx + dy * vy + dz * vz) / (square * np.sqrt(square))
-        for k in range(min(together, len(at) - begin)):
+        for k in range(min(together, len(rows) - begin)):
             result[begin + k] = sums[k]
     return result
-
-
-@compiled
-def _all_beyond(ax: float, ay: float, az: float, square: float, x: Floats, y: Floats, z: Floats) -> bool:
-    """Say whether all points are farther from a centre than a distance, given its square."""
-    near = 0
-    for k in range(len(x)):
-        dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
-        near += 1 if dx * dx + dy * dy + dz * dz <= square else 0
-    return near == 0
 
 
 @compiled
@@ -443,24 +467,25 @@ def _fields(
     items: Ints,
     balls: Floats,
     nodes: Floats,
-    at: Ints,
+    order: Ints,
+    starts: Ints,
+    listed: NDArray[np.int32],
+    rows: Ints,
     together: int,
 ) -> Floats:
     """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all other charges c; d points from c to the place, which has ε."""
-    leaves, stack, result = len(balls) // 2, np.empty(64, dtype=np.int64), np.empty((len(at), 3))
+    leaves, result = len(balls) // 2, np.empty((len(rows), 3))
     x, y, z, soft = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
     fx, fy, fz = np.empty(together), np.empty(together), np.empty(together)
-    for begin in range(0, len(at), together):
+    for begin in range(0, len(rows), together):
         for k in range(together):
-            p = at[min(begin + k, len(at) - 1)]
+            p = order[rows[min(begin + k, len(rows) - 1)]]
             x[k], y[k], z[k], soft[k] = places[p, 0], places[p, 1], places[p, 2], softening[p] ** 2
             fx[k], fy[k], fz[k] = 0.0, 0.0, 0.0
-        stack[0], depth = 1, 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            ax, ay, az, beyond = balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3]
-            if _all_beyond(ax, ay, az, beyond, x, y, z):
+        group = rows[begin] // together
+        for node in listed[starts[group] : starts[group + 1]]:
+            if node > 0:
+                ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
                 charge, mx, my, mz = nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3]
                 for k in range(together):
                     dx, dy, dz = x[k] - ax, y[k] - ay, z[k] - az
@@ -470,11 +495,8 @@ def _fields(
                     fx[k] += straight * dx - mx * cube
                     fy[k] += straight * dy - my * cube
                     fz[k] += straight * dz - mz * cube
-            elif node < leaves:
-                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
-                depth += 2
             else:
-                for item in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
+                for item in range((-node - leaves) * BOXES_PER_LEAF, (-node - leaves + 1) * BOXES_PER_LEAF):
                     e = items[item]
                     if e < 0:
                         continue
@@ -487,6 +509,6 @@ def _fields(
                         fx[k] += share * dx
                         fy[k] += share * dy
                         fz[k] += share * dz
-        for k in range(min(together, len(at) - begin)):
+        for k in range(min(together, len(rows) - begin)):
             result[begin + k, 0], result[begin + k, 1], result[begin + k, 2] = fx[k], fy[k], fz[k]
     return result
