@@ -8,7 +8,7 @@ from signedheat import samples
 from signedheat.mesh.arrangement import arranged
 from signedheat.mesh.components import connected_components
 from signedheat.mesh.edges import edge_table
-from signedheat.mesh.pinches import split_at_pinches
+from signedheat.mesh.pinches import separated, split_at_pinches
 from signedheat.mesh.planar_triangulation import triangulate_faces
 from signedheat.mesh.self_intersections import self_intersections
 from signedheat.mesh.triangles import face_areas
@@ -140,6 +140,12 @@ def test_bodies_that_touch_have_edges_and_vertices_of_their_own():
     again, same = split_at_pinches(split, parted)
     assert again is split
     assert same is parted
+
+
+def test_two_tets_that_share_a_vertex_are_split_there():
+    tet = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+    two = np.concatenate([tet, np.where(tet > 0, tet + 3, 0)])
+    assert len(separated(np.zeros((7, 3)), two)[0]) == 8
 
 
 def test_segments_end_in_faces_that_rounding_flattens():

@@ -5,13 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from signedheat.tets.tet_discretization import memory_estimate, uphill_roots
-from signedheat.tets.tet_levels import manifold
-
-
-def test_two_tets_that_share_a_vertex_are_split_there():
-    tet = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
-    two = np.concatenate([tet, np.where(tet > 0, tet + 3, 0)])
-    assert len(manifold(np.zeros((7, 3)), two)[0]) == 8
 
 
 def test_steepest_ascent_along_a_chain_leads_to_its_highest_tet():

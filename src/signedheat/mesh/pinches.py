@@ -52,7 +52,7 @@ def separated(points: Floats, faces: Ints, overlapping: bool = False) -> tuple[F
     one, other = around[paired], around[partners[paired]]
     following, beyond = (3 * (each // 3) + (each + 1) % 3 for each in (one, other))
     corners = connected_components(faces.size, np.concatenate([one, following]), np.concatenate([beyond, other]))
-    if int(corners.max(initial=-1)) + 1 == len(np.unique(faces)):
+    if int(corners.max(initial=-1)) + 1 == np.count_nonzero(np.bincount(faces.ravel())):
         return points, faces
     numbers, _ = by_first_use(corners, int(corners.max()) + 1)
     owners = np.empty(int(numbers.max()) + 1, dtype=np.int64)

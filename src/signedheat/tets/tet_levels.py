@@ -6,8 +6,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, OutsideError
-from ..mesh.components import connected_components
 from ..mesh.edges import CLEARANCE
+from ..mesh.pinches import separated
 from ..mesh.tet_shapes import TetShapes, face_table
 
 # By a bit mask of the corners below the level: an even permutation that puts these corners first, and their number.
@@ -55,7 +55,7 @@ def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: 
     walls = faces.vertices[faces.tet_counts == 1]
     if below[walls].any() and not below[walls].all():
         keys = np.concatenate([keys, _triangles(walls, below[walls], len(mesh.vertices), FACE_LIDS)[0]])
-    return manifold(*_crossings(mesh.vertices, values, gradients, level, keys, CLEARANCE))
+    return separated(*_crossings(mesh.vertices, values, gradients, level, keys, CLEARANCE))
 
 
 def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) -> tuple[Floats, Ints, Ints]:
@@ -102,20 +102,3 @@ def _triangles(
             keys.append(np.stack([np.minimum(a, b) * n + np.maximum(a, b) for a, b in ends], axis=1))
             owners.append(chosen)
     return np.concatenate(keys), np.concatenate(owners)
-
-
-def manifold(positions: Floats, triangles: Ints) -> tuple[Floats, Ints]:
-    """Make a closed oriented surface manifold: split vertices and edges at which it touches itself."""
-    m = len(triangles)
-    tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    after = np.roll(np.arange(3 * m).reshape(m, 3), -1, axis=1).ravel()  # corner at the head of each halfedge
-    n = len(positions)
-    undirected = np.minimum(tails, heads) * n + np.maximum(tails, heads)
-    forward = np.flatnonzero(tails < heads)
-    backward = np.flatnonzero(tails > heads)
-    forward = forward[np.argsort(undirected[forward], kind="stable")]
-    backward = backward[np.argsort(undirected[backward], kind="stable")]
-    joins = np.concatenate([forward, after[forward]]), np.concatenate([after[backward], backward])
-    vertex = connected_components(3 * m, *joins)
-    _, first = np.unique(vertex, return_index=True)
-    return positions[tails[first]], vertex.reshape(m, 3)
