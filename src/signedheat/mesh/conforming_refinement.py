@@ -6,7 +6,7 @@ Each triangle gets a constrained triangulation of its own, with the points insid
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -22,225 +22,14 @@ from .curve_segments import CurveSegments, MergedSources
 from .edges import EdgeTable
 from .gluing import flip_all, glue, lay_out
 from .intrinsic_mesh import IntrinsicMesh
+from .planar_triangulation import triangulate_crossing
 from .surface_points import EDGE, FACE, VERTEX, ZERO_COORDINATE, LocatedPoints, barycentric_on_edges, points_at_vertices
 
 Point = tuple[float, float]
 Edge = tuple[int, int]
 
-FLAT_AREA = 1e-14
-"""Twice the area of a triangle up to which it is flat; flips that would make such a triangle are not done."""
-
-
-def turn(a: Point, b: Point, c: Point) -> float:
-    """Return twice the signed area of a triangle."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def edges_of(triangle: Sequence[int]) -> tuple[Edge, Edge, Edge]:
-    """Return the directed edges of a triangle."""
-    u, v, w = triangle
-    return (u, v), (v, w), (w, u)
-
-
-@dataclass(frozen=True)
-class _Line:
-    """A segment, and the fraction of it, from its start, along which there are edges already."""
-
-    start: Point
-    end: Point
-    done: float = 0.0
-
-    def share(self, x: Point) -> float:
-        """Return the fraction of the segment at which its point nearest to x lies."""
-        (px, py), (qx, qy) = self.start, self.end
-        return ((x[0] - px) * (qx - px) + (x[1] - py) * (qy - py)) / ((qx - px) ** 2 + (qy - py) ** 2)
-
-    def meets(self, x: Point) -> bool:
-        """Return whether a point lies on the part of the segment that is not yet done."""
-        length = ((self.end[0] - self.start[0]) ** 2 + (self.end[1] - self.start[1]) ** 2) ** 0.5
-        return abs(turn(self.start, self.end, x)) <= ZERO_COORDINATE * length and self.done < self.share(x) <= 1
-
-
-@dataclass(frozen=True, eq=False)
-class Triangulation:
-    """A triangulation of points in a triangle, whose corners are the first three points, counter-clockwise."""
-
-    points: list[Point]  # positions
-    # the corner opposite each directed edge, in the triangle that runs along it
-    apex: dict[Edge, int] = field(default_factory=dict)
-    leaving: dict[int, int] = field(default_factory=dict)  # the end of one of the directed edges that leave each point
-    # for each edge that is part of a segment, the points along it after the first: several if other segments cross it
-    parts: dict[Edge, list[int]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, points: Sequence[Point], sides: Sequence[Sequence[int]]) -> Triangulation:
-        """Make one triangle with points on its sides, listed for each side from tail to head, without corners."""
-        triangulation = cls(list(points))
-        triangulation.add(0, 1, 2)
-        for k, side in enumerate(sides):
-            tail = k
-            for i in side:
-                triangulation.split(tail, (k + 1) % 3, i)
-                tail = i
-        return triangulation
-
-    @property
-    def triangles(self) -> list[tuple[int, int, int]]:
-        """All triangles, counter-clockwise, the least corner first, in order."""
-        return sorted((u, v, w) for (u, v), w in self.apex.items() if u < v and u < w)
-
-    def add(self, u: int, v: int, w: int) -> None:
-        """Add a triangle."""
-        self.apex.update({(u, v): w, (v, w): u, (w, u): v})
-        self.leaving.update({u: v, v: w, w: u})
-
-    def split(self, u: int, v: int, i: int) -> None:
-        """Put a point on an edge, in the triangles on both of its sides."""
-        for a, b in ((u, v), (v, u)):
-            if (a, b) in self.apex:
-                w = self.apex.pop((a, b))
-                self.add(a, i, w)
-                self.add(i, b, w)
-
-    def insert(self, x: Point) -> int:
-        """Put a point into the triangle that contains it, or on its edge; return the number of the point."""
-        triangle = self.locate(x)
-        i = len(self.points)
-        self.points.append(x)
-        for a, b in edges_of(triangle):
-            p, q = self.points[a], self.points[b]
-            length = ((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2) ** 0.5
-            if (b, a) in self.apex and turn(p, q, x) <= ZERO_COORDINATE * length:
-                self.split(a, b, i)
-                return i
-        for a, b in edges_of(triangle):
-            self.add(a, b, i)
-        return i
-
-    def locate(self, x: Point) -> Sequence[int]:
-        """Find the triangle that contains a point by a walk across edges that it lies beyond, or else by a search."""
-        points, apex = self.points, self.apex
-        last = next(reversed(apex))
-        triangle: Sequence[int] = (*last, apex[last])
-        for _ in range(len(apex)):
-            depth, a, b = min((turn(points[a], points[b], x), a, b) for a, b in edges_of(triangle))
-            if depth >= 0 or (b, a) not in apex:
-                break
-            triangle = (b, a, apex[b, a])
-        if depth >= 0:
-            return triangle
-        return max(self.triangles, key=lambda corners: min(turn(points[a], points[b], x) for a, b in edges_of(corners)))
-
-    def around(self, a: int) -> Iterator[Edge]:
-        """Yield the directed edges opposite a point in the triangles around it, counter-clockwise from one of them."""
-        apex, first = self.apex, self.leaving[a]
-        u = first
-        while (a, u) in apex:
-            yield u, apex[a, u]
-            u = apex[a, u]
-            if u == first:
-                return
-        u = first
-        while (u, a) in apex:
-            yield apex[u, a], u
-            u = apex[u, a]
-
-    def connect(self, a: int, b: int) -> list[int]:
-        """Make edges along a segment; return the points on it, with new ones where it crosses other segments.
-
-        They end before b if rounding keeps edges from being made for too long.
-        """
-        way, line = [a], _Line(self.points[a], self.points[b])
-        for _ in range(100 + len(self.apex)):
-            tail = way[-1]
-            if tail == b:
-                break
-            head, crossed = self.aim(tail, b, line)
-            if crossed is not None:
-                head = self.clear(tail, b, crossed, line)
-            if head >= 0:  # else `clear` has made a point, and the next round finds it
-                self.parts.setdefault((tail, head), [head])
-                self.parts.setdefault((head, tail), [tail])
-                way.append(head)
-                line = replace(line, done=max(line.done, line.share(self.points[head])))
-        return way
-
-    def along(self, way: Sequence[int]) -> list[int]:
-        """Return the points along a path, including those that were put on its edges later."""
-        points = [way[0]]
-        for edge in pairwise(way):
-            parts = self.parts[edge]
-            points += parts if len(parts) == 1 else self.along([edge[0], *parts])[1:]
-        return points
-
-    def aim(self, a: int, b: int, line: _Line) -> tuple[int, Edge | None]:
-        """Return the neighbour of a that a segment to b meets first; or −1, and the edge that the segment crosses."""
-        p, q = self.points[a], line.end
-        met, nearest, crossed, most = -1, 2.0, None, -float("inf")
-        for u, w in self.around(a):
-            if b in (u, w):
-                return b, None
-            for i in (u, w):
-                if line.meets(self.points[i]) and line.share(self.points[i]) < nearest:
-                    met, nearest = i, line.share(self.points[i])
-            inside = min(turn(p, self.points[u], q), turn(p, q, self.points[w]))
-            if inside > most:
-                crossed, most = (u, w), inside
-        return met, None if met >= 0 else crossed
-
-    def clear(self, a: int, b: int, edge: Edge, line: _Line) -> int:
-        """Flip the edges that the segment from a to b crosses (Sloan 1993); return the point that it meets first.
-
-        If rounding prevents flips, that is a point near the segment; at another segment, which gets a new point, −1.
-        """
-        points, apex = self.points, self.apex
-        p, q = points[a], line.end
-        (u, w), goal, waiting = edge, -1, []
-        while goal < 0 and (w, u) in apex:
-            if (u, w) in self.parts:
-                self._cross(p, q, u, w)
-                return -1
-            waiting.append((u, w))
-            z = apex[w, u]
-            goal = z if z == b or line.meets(points[z]) else -1
-            u, w = (u, z) if turn(p, q, points[z]) > 0 else (z, w)
-        moved = goal >= 0
-        while moved and (a, goal) not in apex and (goal, a) not in apex:
-            moved, left = False, []
-            for u, v in reversed(waiting):  # back and forth: flips at one end make room for the next
-                w, x = apex[u, v], apex[v, u]
-                if min(turn(points[x], points[v], points[w]), turn(points[w], points[u], points[x])) <= FLAT_AREA:
-                    left.append((u, v))
-                    continue
-                del apex[u, v], apex[v, u]
-                self.add(w, x, v)
-                self.add(x, w, u)
-                moved = True
-                if self._crosses(a, goal, w, x):
-                    left.append((w, x))
-            waiting = left
-        if moved:
-            return goal
-        met, crossed = self.aim(a, b, line)
-        return met if crossed is None else min(crossed, key=lambda i: abs(turn(p, q, points[i])))
-
-    def _cross(self, p: Point, q: Point, u: int, w: int) -> None:
-        """Put a point where the segment from p to q crosses edge uw, which is part of another segment."""
-        r, s = self.points[u], self.points[w]
-        right, left = turn(p, q, r), turn(p, q, s)
-        t = right / (right - left)
-        i = len(self.points)
-        self.points.append((r[0] + t * (s[0] - r[0]), r[1] + t * (s[1] - r[1])))
-        self.split(u, w, i)
-        self.parts[u, w], self.parts[w, u] = [i, w], [i, u]
-        self.parts.update({(u, i): [i], (i, w): [w], (w, i): [i], (i, u): [u]})
-
-    def _crosses(self, a: int, b: int, u: int, v: int) -> bool:
-        """Return whether two segments cross, away from their ends."""
-        if a in (u, v) or b in (u, v):
-            return False
-        p, q, r, s = (self.points[i] for i in (a, b, u, v))
-        return turn(p, q, r) * turn(p, q, s) < 0 and turn(r, s, p) * turn(r, s, q) < 0
+CORNERS: tuple[Point, Point, Point] = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+"""Corners of a face in the coordinates in which it is cut."""
 
 
 def refine_to_conform(
@@ -375,59 +164,67 @@ class FaceCutter:
         """Cut one face along the segments inside it."""
         around = ((self.begin[face] + np.arange(3)) % 3).tolist()
         outline = self.outline(face, around)
-        cut, vertices = Triangulation.of(outline.points, outline.sides), outline.vertices
+        points, vertices = outline.points, outline.vertices
         for i in self.in_face[face]:
             u, v = self.merged.nodes.barycentric[i, around[1:]].tolist()
-            cut.insert((u, v))
+            points.append((u, v))
             vertices.append(self.vertex_of[i])
 
         point_at = {v: k for k, v in reversed(list(enumerate(vertices)))}
         ends = [[point_at[self.vertex_of[i]] for i in self.merged.ends[p].tolist()] for p in inside]
-        ways = [cut.connect(*pair) for pair in ends]
+        segments, corners = np.array(ends, dtype=np.int64).reshape(-1, 2), np.array(outline.corners)
+        cut, divided, triangles, _, chains, starts = triangulate_crossing(
+            np.array(points), corners, segments, ZERO_COORDINATE
+        )
+        ways = np.split(chains, starts[1:-1]) if inside else []
         if any(way[-1] != end for way, (_, end) in zip(ways, ends, strict=True)):
             raise SourceError(
                 f"the curves cross face {face}, which is as thin as rounding",
                 remedy="merge the vertices that nearly coincide",
                 element=f"face {face}",
             )
-        vertices += [self.new_vertex() for _ in range(len(cut.points) - len(vertices))]  # where segments cross
-        (x, y), (a, b, c) = np.array(cut.points).T, self.triangles.corner_positions[face, around]
+        middles = {(u, v): len(points) + k for k, edge in enumerate(divided.tolist()) for u, v in (edge, edge[::-1])}
+        vertices += [self.new_vertex() for _ in divided]  # where segments cross
+        (x, y), (a, b, c) = cut.T, self.triangles.corner_positions[face, around]
         positions = a + x * (b - a) + y * (c - a)
-        self.add_faces(face, cut, outline, positions)
+        self.add_faces(face, triangles, outline, positions)
         for p, way in zip(inside, ways, strict=True):
-            self.add_pieces(p, cut.along(way), outline, positions)
+            self.add_pieces(p, with_middles(way.tolist(), middles), outline, positions)
 
     def outline(self, face: int, around: list[int]) -> Outline:
         """Return a face with the nodes on its sides; `around` lists its corners from the first on."""
         triangles, along = self.triangles, self.merged.nodes.along
-        result = Outline([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)], triangles.corner_vertices[face, around].tolist())
+        result = Outline()
         for k, side in enumerate(around):
             edge, forward = int(triangles.edges.face_edges[face, side]), bool(triangles.edges.forward[face, side])
             order = 1 if forward else -1
-            (x, y), (u, v), chain = result.points[k], result.points[(k + 1) % 3], [k]
+            (x, y), (u, v), begin = CORNERS[k], CORNERS[(k + 1) % 3], len(result.points)
+            result.points.append((x, y))
+            result.vertices.append(int(triangles.corner_vertices[face, side]))
             for i in self.on_edge.get(edge, [])[::order]:
                 t = float(along[i] if forward else 1 - along[i])
-                chain.append(len(result.points))
                 result.points.append((x + t * (u - x), y + t * (v - y)))
                 result.vertices.append(self.vertex_of[i])
-            result.sides.append(chain[1:])
+            end = len(result.points)
+            result.corners.append(end)
             reflected, parts = bool(triangles.reflected[face, side]), self.sub_edges.get(edge, [edge])[::order]
-            for (a, b), part in zip(pairwise([*chain, (k + 1) % 3]), parts, strict=True):
+            for (a, b), part in zip(pairwise([*range(begin, end), end if k < 2 else 0]), parts, strict=True):
                 result.edge_of[a, b] = part, forward
                 result.frames[part] = (a, b, reflected) if forward else (b, a, reflected)
         return result
 
-    def add_faces(self, face: int, cut: Triangulation, outline: Outline, positions: Complexes) -> None:
+    def add_faces(self, face: int, triangles: Ints, outline: Outline, positions: Complexes) -> None:
         """Add the triangles of a face, and the edges within it, which are numbered as they appear."""
-        for corners in cut.triangles:
-            for u, v in edges_of(corners):
+        for corners in triangles.tolist():
+            sides = list(pairwise([*corners, corners[0]]))
+            for u, v in sides:
                 if (u, v) not in outline.edge_of:
                     edge = self.new_edge()
                     outline.edge_of[u, v], outline.edge_of[v, u] = (edge, True), (edge, False)
                     outline.frames[edge] = u, v, False
-            edges, ahead = zip(*(outline.edge_of[side] for side in edges_of(corners)), strict=True)
+            edges, ahead = zip(*(outline.edge_of[side] for side in sides), strict=True)
             vertices = [outline.vertices[i] for i in corners]
-            self.faces.append(NewFace(face, vertices, edges, ahead, positions[list(corners)]))
+            self.faces.append(NewFace(face, vertices, edges, ahead, positions[corners]))
 
     def add_pieces(self, p: int, chain: list[int], outline: Outline, positions: Complexes) -> None:
         """Add the parts of segment p, between the points of a chain, with its normal in the frames of their edges."""
@@ -492,9 +289,9 @@ class FaceCutter:
 class Outline:
     """A face and the nodes on its sides, in coordinates in which its corners are (0, 0), (1, 0) and (0, 1)."""
 
-    points: list[Point]
-    vertices: list[int]  # the vertex at each point
-    sides: list[list[int]] = field(default_factory=list)  # the points along each side, without corners
+    points: list[Point] = field(default_factory=list)  # those on its sides in order, from its first corner on
+    vertices: list[int] = field(default_factory=list)  # the vertex at each point
+    corners: list[int] = field(default_factory=list)  # the points at its second and third corner, and their number
     # the edge between two points, and whether it runs from the first to the second
     edge_of: dict[Edge, tuple[int, bool]] = field(default_factory=dict)
     # the points at tail and head of each edge, and whether its frame is a reflection
@@ -520,6 +317,14 @@ class NewSegment(NamedTuple):
     edge: int  # −1 inside a face
     vector: complex  # normal times length, as in `CurveSegments`
     owner: int  # its source
+
+
+def with_middles(way: Sequence[int], middles: dict[Edge, int]) -> list[int]:
+    """Return the points along a way, with the middles of its edges that were divided later."""
+    points = [way[0]]
+    for u, v in pairwise(way):
+        points += with_middles([u, middles[u, v], v], middles)[1:] if (u, v) in middles else [v]
+    return points
 
 
 def points_on_elements(

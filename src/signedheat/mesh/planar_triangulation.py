@@ -1,4 +1,4 @@
-"""Constrained Delaunay triangulation of triangles with points on their sides and within, and segments."""
+"""Constrained triangulations of triangles with points on their sides and within, and segments; and of polygons."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ DELAUNAY_SINE = 1e-10
 FLIP_TRIES = 64
 """Attempts to flip, per edge that a segment crosses, after which rounding is taken to prevent the flips. Where
 rounding did not, ten sufficed, even across a thousand edges."""
+ROUNDS = 100
+"""Attempts to go on along a segment, beside one for each triangle, after which it ends early."""
 
 
 class Planar(NamedTuple):
@@ -28,6 +30,9 @@ class Planar(NamedTuple):
     fixed: Bools  # (t, 3) whether each edge is part of a segment
     at: Ints  # (n,) a triangle at each vertex
     flat: float  # height below which a triangle is flat
+    near: float  # distance up to which a point lies on a segment
+    room: Ints  # (2,) number of points and of triangles; where segments cross, points are added while there is room
+    parents: Ints  # (n, 2) ends of the edge that each added point divides
 
 
 @compiled
@@ -55,16 +60,13 @@ def triangulate_faces(
         begin, n, rim = starts[f], starts[f + 1] - starts[f], corners[f, 2]
         x = _flattened(points, members[begin : begin + n], corners[f])
         size = max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
-        count = 2 * n - rim - 2
-        tri, adj = np.empty((count, 3), np.int64), np.full((count, 3), -1, np.int64)
-        fixed = np.zeros((count, 3), np.bool_)
-        mesh = Planar(x, tri, adj, fixed, np.zeros(n, np.int64), FLAT_HEIGHT * size)
-        last = _rim(mesh, corners[f])
+        mesh = _rim(x, corners[f], FLAT_HEIGHT * size, FLAT_HEIGHT * size)
         for i in range(rim, n):
-            last = _insert(mesh, last, i)
+            _insert(mesh, i)
         for s in range(segment_starts[f], segment_starts[f + 1]):
-            _connect(mesh, segments[s, 0], segments[s, 1])
+            _connect(mesh, segments[s, 0], np.zeros(1), segments[s, 0], segments[s, 1], [0])
         _improve(mesh)
+        last, tri, adj, fixed = mesh.room[1], mesh.tri, mesh.adj, mesh.fixed
         for t in range(last):
             for k in range(3):
                 triangles[filled + t, k] = members[begin + tri[t, k]]
@@ -72,6 +74,67 @@ def triangulate_faces(
             owners[filled + t] = f
         filled += last
     return triangles[:filled], owners[:filled], across[:filled]
+
+
+@compiled
+def triangulate_crossing(
+    x: Floats, corners: Ints, segments: Ints, near: float
+) -> tuple[Floats, Ints, Ints, Ints, Ints, Ints]:
+    """Triangulate a triangle in the plane with (n, 2) points on its rim and within, and segments that may cross.
+
+    `corners` are as a row of those of `triangulate_faces`. A point lies on a segment up to a distance `near`. Returns
+    (n + c, 2) points, with those where segments cross; (c, 2) ends of the edge, part of an earlier segment, that each
+    of them divides; (k, 3) triangles, and the triangle across each edge, −1 across segments and rims; and the points
+    along all segments, one after the other, and where each begins, (s + 1,). A segment that rounding keeps from being
+    made ends before its second point.
+    """
+    n, size = len(x), max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
+    mesh = _rim(x, corners, FLAT_HEIGHT * size, near)
+    for i in range(corners[2], n):
+        _insert(mesh, i)
+    ways, starts = [0], np.zeros(len(segments) + 1, np.int64)
+    ways.clear()
+    for s in range(len(segments)):
+        begin, b = segments[s]
+        a, done = begin, np.zeros(1)
+        ways.append(a)
+        for _ in range(ROUNDS + mesh.room[1]):
+            points = mesh.room[0]
+            a = _connect(mesh, begin, done, a, b, ways)
+            if a == b:
+                break
+            if mesh.room[0] > points:
+                continue
+            if points == len(mesh.x):
+                mesh = _with_room(mesh)
+                continue
+            goal = _beside(mesh, begin, done, a, b)
+            _fix(mesh, a, goal)
+            done[0] = max(done[0], _share(mesh.x, begin, b, goal))
+            ways.append(goal)
+            a = goal
+        starts[s + 1] = len(ways)
+    total, last = mesh.room
+    across = np.where(mesh.fixed, -1, mesh.adj)
+    return mesh.x[:total], mesh.parents[n:total], mesh.tri[:last], across[:last], np.array(ways), starts
+
+
+@compiled
+def _with_room(mesh: Planar) -> Planar:
+    """Return a triangulation with room for twice as many points."""
+    x, tri, adj, fixed, at, flat, near, room, parents = mesh
+    n, more = len(x), len(x) + 4
+    return Planar(
+        np.concatenate((x, np.empty((more, 2)))),
+        np.concatenate((tri, np.empty((2 * more, 3), np.int64))),
+        np.concatenate((adj, np.full((2 * more, 3), -1, np.int64))),
+        np.concatenate((fixed, np.zeros((2 * more, 3), np.bool_))),
+        np.concatenate((at, np.zeros(more, np.int64))),
+        flat,
+        near,
+        room,
+        np.concatenate((parents, np.empty((n + more - len(parents), 2), np.int64))),
+    )
 
 
 @compiled
@@ -107,20 +170,22 @@ def _length(x: Floats, a: int, b: int) -> float:
 
 
 @compiled
-def _rim(mesh: Planar, corners: Ints) -> int:
-    """Divide the face at the points on its rim; return the number of triangles."""
-    tri, at = mesh.tri, mesh.at
+def _rim(x: Floats, corners: Ints, flat: float, near: float) -> Planar:
+    """Divide a triangle at the points on its rim."""
+    n, rim = len(x), corners[2]
+    count = 2 * n - rim - 2
+    tri, adj = np.empty((count, 3), np.int64), np.full((count, 3), -1, np.int64)
+    fixed, at = np.zeros((count, 3), np.bool_), np.zeros(n, np.int64)
+    mesh = Planar(x, tri, adj, fixed, at, flat, near, np.array([n, 1]), np.empty((0, 2), np.int64))
     tri[0, 0], tri[0, 1], tri[0, 2] = 0, corners[0], corners[1]
     at[0] = at[corners[0]] = at[corners[1]] = 0
-    count = 1
     for side in range(3):
         begin = 0 if side == 0 else corners[side - 1]
-        end = corners[side] if side < 2 else corners[2]
+        end = corners[side] if side < 2 else rim
         for i in range(begin + 1, end):
-            edge = _edge(mesh, i - 1, end % corners[2])
-            _split(mesh, edge // 3, edge % 3, i, count)
-            count += 1
-    return count
+            edge = _edge(mesh, i - 1, end % rim)
+            _split(mesh, edge // 3, edge % 3, i)
+    return mesh
 
 
 @compiled
@@ -133,9 +198,9 @@ def _point_to(tri: Ints, adj: Ints, t: int, tail: int, neighbour: int) -> None:
 
 
 @compiled
-def _split(mesh: Planar, t: int, k: int, i: int, new: int) -> None:
-    """Put a vertex on edge k of a triangle; the half from the vertex to the edge's head is new."""
-    tri, adj, at = mesh.tri, mesh.adj, mesh.at
+def _split(mesh: Planar, t: int, k: int, i: int) -> int:
+    """Put a vertex on edge k of a triangle; return the half from the vertex to the edge's head, which is new."""
+    tri, adj, fixed, at, new = mesh.tri, mesh.adj, mesh.fixed, mesh.at, mesh.room[1]
     a, b = (k + 1) % 3, (k + 2) % 3
     u, v, w = tri[t, k], tri[t, a], tri[t, b]
     beyond = adj[t, a]
@@ -144,7 +209,25 @@ def _split(mesh: Planar, t: int, k: int, i: int, new: int) -> None:
     _point_to(tri, adj, beyond, w, new)
     tri[t, a] = i
     adj[t, k], adj[t, a] = -1, new
+    fixed[new, 0], fixed[new, 1], fixed[new, 2] = fixed[t, k], fixed[t, a], False
+    fixed[t, a] = False
     at[i], at[v], at[w], at[u] = t, new, t, t
+    mesh.room[1] += 1
+    return new
+
+
+@compiled
+def _split_both(mesh: Planar, t: int, k: int, i: int) -> None:
+    """Put a vertex on edge k of a triangle, and on that of the triangle beyond."""
+    tri, adj = mesh.tri, mesh.adj
+    a, b, s = tri[t, k], tri[t, (k + 1) % 3], adj[t, k]
+    j = _place(tri, s, b)
+    first, second = _split(mesh, t, k, i), _split(mesh, s, j, i)
+    # (i, b, c) and (i, a, d); t is (a, i, c), s is (b, i, d)
+    _point_to(tri, adj, t, a, second)
+    _point_to(tri, adj, second, i, t)
+    _point_to(tri, adj, s, b, first)
+    _point_to(tri, adj, first, i, s)
 
 
 @compiled
@@ -170,25 +253,18 @@ def _flip(mesh: Planar, t: int, k: int) -> int:
 
 
 @compiled
-def _insert(mesh: Planar, count: int, i: int) -> int:
-    """Put a point into the triangle that contains it and restore Delaunay by flips; return the number of triangles."""
-    x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
-    t, k, depth = _locate(mesh, count, i)
+def _insert(mesh: Planar, i: int) -> None:
+    """Put a point into the triangle that contains it and restore Delaunay by flips."""
+    x, tri, adj, at = mesh.x, mesh.tri, mesh.adj, mesh.at
+    t, k, depth = _locate(mesh, i)
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
     s = adj[t, k]
-    if s >= 0 and depth <= flat * _length(x, a, b):  # on an edge: four triangles
-        j = _place(tri, s, b)
-        _split(mesh, t, k, i, count)
-        _split(mesh, s, j, i, count + 1)
-        first, second = count, count + 1  # (i, b, c) and (i, a, d); t is (a, i, c), s is (b, i, d)
-        _point_to(tri, adj, t, a, second)
-        _point_to(tri, adj, second, i, t)
-        _point_to(tri, adj, s, b, first)
-        _point_to(tri, adj, first, i, s)
-        count += 2
+    if s >= 0 and depth <= mesh.near * _length(x, a, b):  # on an edge: four triangles
+        _split_both(mesh, t, k, i)
     else:
         bc, ca = adj[t, (k + 1) % 3], adj[t, (k + 2) % 3]
-        first, second = count, count + 1
+        first = mesh.room[1]
+        second = first + 1
         tri[t, 0], tri[t, 1], tri[t, 2] = a, b, i
         adj[t, 0], adj[t, 1], adj[t, 2] = s, first, second
         tri[first, 0], tri[first, 1], tri[first, 2] = b, c, i
@@ -198,9 +274,8 @@ def _insert(mesh: Planar, count: int, i: int) -> int:
         _point_to(tri, adj, bc, c, first)
         _point_to(tri, adj, ca, a, second)
         at[i], at[a], at[b], at[c] = t, t, t, first
-        count += 2
+        mesh.room[1] += 2
     _legalize(mesh, i)
-    return count
 
 
 @compiled
@@ -224,10 +299,10 @@ def _legalize(mesh: Planar, i: int) -> None:
 @compiled
 def _improve(mesh: Planar) -> None:
     """Flip edges that are not Delaunay."""
-    tri, adj, fixed = mesh.tri, mesh.adj, mesh.fixed
+    adj, fixed = mesh.adj, mesh.fixed
     for _ in range(64):  # most faces need three passes
         flips = 0
-        for t in range(len(tri)):
+        for t in range(mesh.room[1]):
             for k in range(3):
                 if adj[t, k] > t and not fixed[t, k] and _bad(mesh, t, k):
                     _flip(mesh, t, k)
@@ -262,9 +337,9 @@ def _convex(x: Floats, a: int, b: int, c: int, d: int, flat: float) -> bool:
 
 
 @compiled
-def _locate(mesh: Planar, count: int, i: int) -> tuple[int, int, float]:
+def _locate(mesh: Planar, i: int) -> tuple[int, int, float]:
     """Return the triangle that contains a point, and for it what `_side` returns."""
-    x, tri, adj = mesh.x, mesh.tri, mesh.adj
+    x, tri, adj, count = mesh.x, mesh.tri, mesh.adj, mesh.room[1]
     t = count - 1
     for _ in range(count):
         k, depth = _side(x, tri, t, i)
@@ -312,49 +387,86 @@ def _edge(mesh: Planar, u: int, v: int) -> int:
 
 
 @compiled
-def _connect(mesh: Planar, a: int, b: int) -> None:
-    """Make edges from a to b through the points that the segment meets, by flips (Sloan 1993), if rounding allows."""
-    fixed = mesh.fixed
+def _connect(mesh: Planar, begin: int, done: Floats, a: int, b: int, way: list[int]) -> int:
+    """Make edges from a to b, along a segment to b, by flips (Sloan 1993), and add the points that it meets to a way.
+
+    Return the last one: b, unless rounding does not allow it, or the segment crosses another, where a point is added if
+    there is room.
+    """
     while a != b:
-        t, k, goal = _aim(mesh, a, b)
+        t, k, goal = _aim(mesh, begin, done, a, b)
         if goal < 0:
             if t < 0:
-                return
-            goal = _clear(mesh, t, k, a, b)
-            if goal < 0:
-                return
-        for tail, head in ((a, goal), (goal, a)):
-            edge = _edge(mesh, tail, head)
-            if edge >= 0:
-                fixed[edge // 3, edge % 3] = True
+                return a
+            goal = _clear(mesh, t, k, begin, done, a, b)
+            if goal < 0 or goal == a:
+                return a
+        _fix(mesh, a, goal)
+        done[0] = max(done[0], _share(mesh.x, begin, b, goal))
+        way.append(goal)
         a = goal
+    return a
 
 
 @compiled
-def _aim(mesh: Planar, a: int, b: int) -> tuple[int, int, int]:
+def _fix(mesh: Planar, a: int, b: int) -> None:
+    """Make an edge part of a segment."""
+    for tail, head in ((a, b), (b, a)):
+        edge = _edge(mesh, tail, head)
+        if edge >= 0:
+            mesh.fixed[edge // 3, edge % 3] = True
+
+
+@compiled
+def _aim(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> tuple[int, int, int]:
     """Return the triangle at a and its edge that the segment to b crosses, and the neighbour that it meets, or −1."""
-    x, tri, adj, at, flat = mesh.x, mesh.tri, mesh.adj, mesh.at, mesh.flat
+    x, tri, adj, at = mesh.x, mesh.tri, mesh.adj, mesh.at
     first = at[a]
-    t, back, length = first, False, _length(x, a, b)
-    crossed, edge = -1, -1
+    t, back = first, False
+    crossed, edge, most, met = -1, -1, -np.inf, -1
     while t >= 0:
         k = _place(tri, t, a)
         u, w = tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
         if u == b or w == b:
             return t, k, b
         for i in (u, w):
-            ahead = (x[i, 0] - x[a, 0]) * (x[b, 0] - x[a, 0]) + (x[i, 1] - x[a, 1]) * (x[b, 1] - x[a, 1])
-            nearer = ahead > 0.0 and _length(x, i, b) < length  # or segments through flat faces would not end
-            if nearer and abs(_turn(x, a, b, i)) <= flat * length:
-                return t, k, i
-        if _turn(x, a, b, u) < 0.0 and _turn(x, a, b, w) > 0.0:
-            crossed, edge = t, (k + 1) % 3
+            if (met < 0 or _share(x, begin, b, i) < _share(x, begin, b, met)) and _meets(mesh, begin, done, b, i):
+                met = i
+        inside = min(-_turn(x, a, b, u), _turn(x, a, b, w))
+        if inside > most:
+            crossed, edge, most = t, (k + 1) % 3, inside
         t = adj[t, k if back else (k + 2) % 3]
         if t < 0 and not back:
             back, t = True, adj[first, _place(tri, first, a)]
         if t == first:
             break
-    return crossed, edge, -1
+    return crossed, edge, met
+
+
+@compiled
+def _share(x: Floats, a: int, b: int, i: int) -> float:
+    """Return how far along a segment a point lies, times the length of the segment."""
+    return (x[i, 0] - x[a, 0]) * (x[b, 0] - x[a, 0]) + (x[i, 1] - x[a, 1]) * (x[b, 1] - x[a, 1])
+
+
+@compiled
+def _meets(mesh: Planar, begin: int, done: Floats, b: int, i: int) -> bool:
+    """Return whether a segment meets a point beyond the share of it along which there are edges already."""
+    x = mesh.x
+    if not done[0] < _share(x, begin, b, i) <= _share(x, begin, b, b):  # else it would not end
+        return False
+    return abs(_turn(x, begin, b, i)) <= mesh.near * _length(x, begin, b)
+
+
+@compiled
+def _beside(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> int:
+    """Return the neighbour of a at which a segment to b goes on where rounding prevents flips."""
+    x = mesh.x
+    t, k, goal = _aim(mesh, begin, done, a, b)
+    if goal >= 0:
+        return goal
+    u, w = mesh.tri[t, k], mesh.tri[t, (k + 1) % 3]
+    return u if abs(_turn(x, a, b, u)) <= abs(_turn(x, a, b, w)) else w
 
 
 @compiled
@@ -367,20 +479,24 @@ def _place(tri: Ints, t: int, a: int) -> int:
 
 
 @compiled
-def _clear(mesh: Planar, t: int, k: int, a: int, b: int) -> int:
-    """Flip the edges that a segment crosses, from edge k of a triangle on; return the point that it meets, or −1."""
+def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: int) -> int:
+    """Flip the edges that a segment crosses, from edge k of a triangle on; return the point that it meets, or −1.
+
+    At an edge of another segment a point is added, and a is returned: nothing is flipped.
+    """
     x, tri, adj, fixed, flat = mesh.x, mesh.tri, mesh.adj, mesh.fixed, mesh.flat
     tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]
-    length = _length(x, a, b)
     while True:  # edges across the segment: tails on its right, heads on its left
-        if adj[t, k] < 0 or fixed[t, k]:
+        if adj[t, k] < 0:
             return -1
+        if fixed[t, k]:
+            return a if _cross(mesh, t, k, a, b) else -1
         u = tri[t, k]
         s = adj[t, k]
         j = (_place(tri, s, u) + 2) % 3
         z = tri[s, (j + 2) % 3]
         turn = _turn(x, a, b, z)
-        if z == b or abs(turn) <= flat * length:
+        if z == b or _meets(mesh, begin, done, b, z):
             break
         t, k = s, ((j + 1) % 3 if turn > 0.0 else (j + 2) % 3)  # (u, z) or (z, head)
         tails.append(tri[t, k])
@@ -408,3 +524,20 @@ def _clear(mesh: Planar, t: int, k: int, a: int, b: int) -> int:
             tails.append(c if right else d)
             heads.append(d if right else c)
     return z
+
+
+@compiled
+def _cross(mesh: Planar, t: int, k: int, a: int, b: int) -> bool:
+    """Add a point where a segment crosses edge k of a triangle, unless there is no room."""
+    x, i = mesh.x, mesh.room[0]
+    if i == len(x):
+        return False
+    u, w = mesh.tri[t, k], mesh.tri[t, (k + 1) % 3]
+    right, left = _turn(x, a, b, u), _turn(x, a, b, w)
+    share = right / (right - left)
+    for d in range(2):
+        x[i, d] = x[u, d] + share * (x[w, d] - x[u, d])
+    mesh.parents[i, 0], mesh.parents[i, 1] = u, w
+    mesh.room[0] += 1
+    _split_both(mesh, t, k, i)
+    return True
