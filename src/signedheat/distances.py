@@ -15,8 +15,9 @@ from .curves.drawings import distance_to_lines
 from .errors import SourceError, UnsupportedTypeError
 from .fields.field import Field
 from .fields.sharpening import sharpen
-from .grids.grid import Dimension, Grid, room_around
+from .grids.grid import Dimension, Grid
 from .jobs import Progress, within
+from .mesh.box_tree import room_around
 from .mesh.polylines import FillRule
 from .shapes.area_elements import bounds_around
 from .shapes.foreign import ForeignShape, as_list, as_shapes, converted

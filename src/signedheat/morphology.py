@@ -25,9 +25,10 @@ from .errors import (
 )
 from .fields.blends import smooth_difference, smooth_intersection, smooth_union
 from .fields.field import Field
-from .grids.grid import RESOLUTION, Grid, room_around
+from .grids.grid import RESOLUTION, Grid
 from .grids.polyline import Polyline
 from .jobs import Progress
+from .mesh.box_tree import room_around
 from .mesh.triangles import part_volumes
 from .parallel import PointTree
 from .search.face_tree import FaceFeatures, FaceTree

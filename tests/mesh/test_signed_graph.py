@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from signedheat.mesh.signed_graph import Links, best_signs, signs_of
+from signedheat.surfaces.normal_orientation import spread_out
 from signedheat.surfaces.plane_fits import CLEAN_NEIGHBORS, fit_planes, least_eigenvector, noise_scale
-from signedheat.surfaces.point_cloud import spread_out
 
 
 def random_pairs(rng, n, m):

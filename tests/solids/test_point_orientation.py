@@ -8,7 +8,7 @@ from refusals import refused
 from signedheat import samples
 from signedheat.solids.gauss import Pieces, system_of
 from signedheat.solids.point_orientation import orient_points
-from signedheat.surfaces.point_cloud import outward_normals
+from signedheat.surfaces.normal_orientation import outward_normals
 
 
 def box(size, center=(0.0, 0.0, 0.0)):

@@ -15,7 +15,7 @@ from signedheat.samples import sphere
 from signedheat.solids.point_orientation import orient_points
 from signedheat.surfaces import point_cloud
 from signedheat.surfaces.local_triangulations import hole_fillings, local_triangulations
-from signedheat.surfaces.point_cloud import neighbors_agree, spread_out
+from signedheat.surfaces.normal_orientation import neighbors_agree, spread_out
 
 
 def sphere_with_circle(n, height=0.3, seed=0):

@@ -9,8 +9,8 @@ from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
 from signedheat.surfaces.cotan import assemble, cotan_matrix
 from signedheat.surfaces.digital_surface import boundary_surfels, corrected_normals, smoothed_corners
 from signedheat.surfaces.local_triangulations import hole_fillings
+from signedheat.surfaces.normal_orientation import sign_links, spread_out
 from signedheat.surfaces.plane_fits import MERGED_SHARE, noisy_sizes, share_of_two_sides
-from signedheat.surfaces.point_cloud import sign_links, spread_out
 from signedheat.surfaces.source_segments import segments_of_each
 from signedheat.surfaces.vector_heat import extrapolated, nonmanifold_frames
 

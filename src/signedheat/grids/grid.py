@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..arrays import Bools, Floats, Frozen, short
 from ..errors import GeometryError, MemoryLimitError
 from ..fields.field_domain import Exact, FieldDomain, different
+from ..mesh.box_tree import room_around
 from ..mesh.triangles import flipped_along_creases
 from ..packages import lazy_module
 from ..parallel import in_chunks
@@ -367,12 +368,6 @@ class GridInterpolant:
             rise = self._between(ahead) - self._between(behind)
             slopes[:, axis] = rise / (ahead[:, axis] - behind[:, axis])
         return slopes
-
-
-def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = 0.2) -> float:
-    """Return the padding of a box: a share of its longest side for its completion, and room for offsets to `reach`."""
-    lower, upper = np.asarray(bounds, dtype=np.float64)
-    return share * float((upper - lower).max()) + 1.05 * reach
 
 
 def _box(bounds: Any) -> Any:

@@ -6,7 +6,7 @@ from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Ints
 from ..compiled import compiled
@@ -206,6 +206,12 @@ def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
     """Return (n, 3) lower and upper corners of the boxes around (n, k, 3) corners: NumPy is slow along short axes."""
     columns = corners.swapaxes(0, 1)
     return reduce(np.minimum, columns), reduce(np.maximum, columns)
+
+
+def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = 0.2) -> float:
+    """Return the padding of a box: a share of its longest side for its completion, and room for offsets to `reach`."""
+    lower, upper = np.asarray(bounds, dtype=np.float64)
+    return share * float((upper - lower).max()) + 1.05 * reach
 
 
 @np.errstate(all="ignore")

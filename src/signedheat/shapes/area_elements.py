@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
-from math import gamma, pi
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from ..mesh.triangles import AREA_ROUNDING, area_vectors
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import same_positions
 from ..parallel import PointTree
-from ..surfaces.plane_fits import POINT_NEIGHBORS
+from ..surfaces.plane_fits import POINT_NEIGHBORS, areas_per_point
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -132,9 +131,7 @@ def point_areas(points: Floats) -> Floats:
     if dimension == 0 or k == 0:
         return np.ones(len(points)) / counts[which.ravel()]
     reach = PointTree(places).query(places, k=[k + 1])[0][:, 0]
-    unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
-    areas: Floats = unit_ball * reach**dimension / k / counts
-    return areas[which.ravel()]
+    return (areas_per_point(reach, k, dimension) / counts)[which.ravel()]
 
 
 def components_of(vertices: Floats, faces: Ints) -> Ints:

@@ -18,10 +18,11 @@ from ..compiled import compiled
 from ..constraints import Constraint, ZeroSet
 from ..discretization import discretize
 from ..errors import OutsideError
-from ..grids.grid import Grid, room_around
+from ..grids.grid import Grid
 from ..grids.grid_discretization import GridSource
 from ..grids.marching import closed_surface
 from ..grids.stencil import solve_poisson
+from ..mesh.box_tree import room_around
 from ..mesh.components import sums_of
 from ..method import diffuse, integrate, normalize
 from ..parallel import in_threads

@@ -9,7 +9,9 @@ from ..diagnostics import OrientedPoints, StrayPoints
 from ..errors import GeometryError
 from ..mesh.unit_vectors import unit
 from ..parallel import PointTree, in_chunks
-from ..surfaces.point_cloud import PointCloud, outward_normals
+from ..surfaces.normal_orientation import outward_normals
+from ..surfaces.plane_fits import point_spacing
+from ..surfaces.point_cloud import PointCloud
 
 STRAY_DISTANCE = 3.0
 """A point is a stray if its distance to the nearest points is this many times that of the points around it."""
@@ -111,7 +113,7 @@ def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
 def mean_gap(points: Floats) -> float:
     """Return the root of the area per point, taken from discs around (n, 3) points up to their sixth neighbours."""
     reach = PointTree(points).query(points, k=[min(7, len(points))])[0]
-    return float(np.median(reach) * np.sqrt(np.pi / 7.0))
+    return float(np.median(point_spacing(reach, 7)))
 
 
 def _fit(

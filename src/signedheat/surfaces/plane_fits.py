@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import gamma, pi
 
 import numpy as np
 
@@ -90,9 +91,15 @@ def noise_scale(points: Floats, normals: Floats | None = None) -> int | None:
     return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
+def areas_per_point(distances: Floats, k: int, dimension: int = 2) -> Floats:
+    """Estimate areas, or sizes of that dimension, of points: the ball up to the k-th neighbour has k of them."""
+    unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
+    return np.asarray(unit_ball * distances**dimension / k)
+
+
 def point_spacing(distances: Floats, k: int) -> Floats:
-    """Estimate spacing from the distance to the k-th neighbour: the disk of that radius has k squared spacings."""
-    return distances / np.sqrt(k / np.pi)
+    """Estimate the spacing of points on a surface from the distance to the k-th neighbour."""
+    return np.sqrt(areas_per_point(distances, k))
 
 
 def share_of_two_sides(points: Floats, normals: Floats) -> float:

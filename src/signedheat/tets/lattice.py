@@ -19,8 +19,8 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, MemoryLimitError
-from ..grids.grid import room_around
 from ..memory import refuse_beyond_memory
+from ..mesh.box_tree import room_around
 from ..mesh.components import places_among
 from ..parallel import PointTree
 from ..shapes.area_elements import area_elements, bounds_around

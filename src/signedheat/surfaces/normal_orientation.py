@@ -1,0 +1,247 @@
+"""The outward orientation of normals at points.
+
+The ball around a Delaunay tet touches four points and contains none. Where it touches two of them along their normals,
+it lies on the same side of the surface near both. So tets link the signs of normals, across edges, gaps and thin walls
+alike, without a triangulated surface. Faces of the convex hull link them with the outside. (Poles of Voronoi cells:
+Amenta & Bern 1999; labels from balls that overlap: Kolluri, Shewchuk & O'Brien 2004.)
+
+Gauss's formula (`signedheat.solids.gauss`) needs an inside, which clouds need not have: on points of open sheets
+(waves, terrains, saddles) it turns half of the normals, where these links turn none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy
+
+from ..arrays import Bools, Floats, Ints
+from ..compiled import compiled
+from ..jobs import interruptible
+from ..mesh.signed_graph import Links, signs_of
+from ..mesh.unit_vectors import SAME_WAY, unit
+from ..parallel import PointTree
+from .local_triangulations import SAME_SIDE_HEIGHT, opposed_normals
+from .plane_fits import POINT_NEIGHBORS, PlaneFits, fit_planes, noise_scale, noisy_sizes, point_spacing
+
+KEPT_SPACING = 0.35
+"""Least distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
+MOST_TET_POINTS = 100_000
+"""Largest number of points for which tets are made; the others take the signs of their neighbours."""
+WEAK_WEIGHT = 0.1
+"""Weight of what tells sides less surely than balls do: of a link between neighbours, relative to that of a ball (with
+noisy points they weigh the same), and of given signs, relative to half the typical sum of all links of a point."""
+MOST_WRONG = 3.0
+"""Given signs stay unless the share that seems wrong exceeds this many times the share of contradictions."""
+COHERENCE_GAIN = 0.0015
+"""Gain of coherence for which larger neighbourhoods are taken, and loss at which no larger ones are tried."""
+JOGGLE = 1e-4
+"""Random shift of points, relative to their reach, since flat faces and lattices are slow to triangulate."""
+BALL_COSINE = 0.5
+"""Cosine between a normal and the direction to a ball's centre below which a ball links no signs."""
+OUTLIER_DISTANCE = 4.0
+"""Distance from a point to its neighbours, relative to that from these to theirs, above which it is an outlier. It is
+up to 1.4 where spacing is even, and 1.6 where density halves within three spacings."""
+UPWARD = np.array([0.01, 0.1, 1.0])
+"""Outward direction where nothing decides it, as for points in a plane: up, and on vertical planes along the second
+axis. If a component is halved or doubled, planes keep their sides."""
+MUTUALLY_BELOW = 0.98
+"""Given normals are kept on thin sheets if, of all near points with opposite normals, the shares below and above the
+other point differ by at least this. On thin sheets the difference is 1, and 0.9 if a fifth of the normals are turned.
+"""
+LISTED_AT_ONCE = 4096
+"""Number of points whose neighbours are listed at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutwardSigns:
+    """Signs that turn axes outwards."""
+
+    signs: Floats  # (n,) 1 or −1
+    sided: bool  # whether some link decides which side is out
+    coherence: float  # share of the weights of links that the signs agree with, less the share that they contradict
+
+
+def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats, PlaneFits, OutwardSigns]:
+    """Orient normals at (n, 3) distinct points outwards: the given ones, some of which are inverted, or fitted ones."""
+    if given is None:
+        fits, outward = fitted_outward(points)
+        return fits.axes * outward.signs[:, None], fits, outward
+    fits = fit_planes(points, noise_scale(points, given))
+    outward = outward_signs(fits, given, given=True)
+    outward = replace(outward, signs=kept_on_thin_sheets(points, given, outward.signs))
+    return given * outward.signs[:, None], fits, outward
+
+
+def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
+    """Keep the signs of given normals (n, 3) on sheets thinner than the spacing, where balls are no evidence.
+
+    They are kept if, all over the cloud, near points with opposite normals are each below the other, or each above.
+    """
+    k = min(POINT_NEIGHBORS, len(points) - 1)
+    distances, near = PointTree(points).query(points, k=k + 1)
+    flat = SAME_SIDE_HEIGHT * point_spacing(distances[:, k], k)
+    offsets = points[near] - points[:, None]
+    opposed = opposed_normals(points, given, flat, near)
+    below = -np.sign((offsets * given[:, None]).sum(axis=2))[opposed]
+    if len(below) == 0 or abs(below.mean()) < MUTUALLY_BELOW:
+        return signs
+    thin = opposed.any(axis=1)
+    inverted = below.mean() < 0 and (signs[~thin] if not thin.all() else signs).sum() < 0
+    return np.where(thin, -1.0 if inverted else 1.0, signs)
+
+
+def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
+    """Fit planes to neighbourhoods of the size at which signs contradict each other least; return these signs, too."""
+    tried: list[tuple[PlaneFits, OutwardSigns]] = []
+    for size in noisy_sizes(points) or (None,):
+        fits = fit_planes(points, size)
+        tried.append((fits, outward_signs(fits, fits.axes)))
+        best = max(outward.coherence for _, outward in tried)
+        if tried[-1][1].coherence < best - COHERENCE_GAIN:
+            break
+    return next((fits, outward) for fits, outward in tried if outward.coherence >= best - COHERENCE_GAIN)
+
+
+def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> OutwardSigns:
+    """Find signs that turn axes (n, 3) outwards."""
+    # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
+    n = len(axes)
+    chosen = spread_out(fits.places, KEPT_SPACING * fits.reaches) if fits.noisy else np.arange(n)
+    chosen = chosen[~_lone(fits.places[chosen], fits.reaches[chosen])]
+    if len(chosen) > MOST_TET_POINTS:
+        chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST_TET_POINTS, replace=False))
+    places = fits.places[chosen]
+    links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
+    m = len(chosen)
+    if given or not sided:
+        typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
+        own = np.ones(m) if given else axes[chosen] @ UPWARD
+        links = Links.joined(links, Links(np.arange(m), np.full(m, m + 1), WEAK_WEIGHT * typical * own))
+    # signs of the chosen points, relative to the outside or to the given signs; others follow their neighbours
+    decision = signs_of(links, m + 2)
+    signs = np.zeros(n)
+    signs[chosen] = decision[:m] * decision[m if sided else m + 1]
+    rest = np.flatnonzero(signs == 0)
+    if len(rest):
+        signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
+    coherence = links.coherence(decision)
+    if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
+        signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
+    return OutwardSigns(signs, sided, coherence)
+
+
+def _lone(places: Floats, reaches: Floats) -> Bools:
+    """(n,) whether a point is an outlier, much farther from its neighbours than these are from theirs."""
+    near = PointTree(places).query(places, k=min(POINT_NEIGHBORS + 1, len(places)))[1]
+    return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
+
+
+def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
+    """(k,) signs that make the axes at `others` (k, 3) agree with the normals around them."""
+    distances, near = PointTree(places).query(others, k=min(6, len(places)))
+    distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
+    weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
+    cosines = np.einsum("nj,nkj->nk", axes, normals[near])
+    return np.where((weights * cosines * np.abs(cosines)).sum(axis=1) >= 0, 1.0, -1.0)
+
+
+def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
+    """Link signs of axes (n, 3) by neighbours, balls and the hull (to the outside, node n); tell if there are balls."""
+    near = _neighbor_links(places, axes, 1.0 if noisy else WEAK_WEIGHT)
+    moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
+    try:
+        tets = interruptible(scipy.spatial.Delaunay, places + moves)
+    except (scipy.spatial.QhullError, ValueError):
+        return near, False
+    if tets.simplices.max() >= len(places):  # Qhull gave up on precision, and its point at infinity is a corner
+        return near, False
+    flat = np.ptp(places @ np.linalg.eigh(np.cov(places.T))[1][:, 0]) <= 10 * JOGGLE * float(reaches.max())
+    if flat:
+        return near, False
+    balls = _ball_links(places, axes, tets.simplices.astype(np.int64))
+    return Links.joined(near, balls, _hull_links(places, axes, tets)), True
+
+
+def _confidence(cosines: Floats) -> Floats:
+    """Signed fourth power of cosines, zero below `BALL_COSINE`."""
+    return np.where(np.abs(cosines) > BALL_COSINE, np.sign(cosines) * cosines**4, 0.0)
+
+
+def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
+    """Link the signs at every two corners of a tet (t, 4) along whose axes its circumscribed ball lies."""
+    corners = places[tets]
+    u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
+    uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
+    vw = np.cross(v, w)
+    volume = (u * vw).sum(axis=1)
+    center = uu * vw + vv * np.cross(w, u) + ww * np.cross(u, v)  # times twice the volume
+    size = np.maximum(np.maximum(uu, vv), ww)[:, 0]
+    solid = np.abs(volume) > 1e-10 * size**1.5
+    center /= 2 * np.where(solid, volume, 1.0)[:, None]
+    radius = np.linalg.norm(center, axis=1)
+    toward = (corners[:, :1] + center[:, None] - corners) / np.where(solid, radius, 1.0)[:, None, None]
+    sides = _confidence(np.einsum("tkj,tkj->tk", toward, axes[tets]) * solid[:, None])
+    pairs = [(a, b) for a in range(4) for b in range(a)]
+    weights = np.concatenate([sides[:, a] * sides[:, b] for a, b in pairs])
+    linked = weights != 0
+    tails, heads = (np.concatenate([tets[:, pair[k]] for pair in pairs])[linked] for k in (0, 1))
+    return Links(tails, heads, weights[linked])
+
+
+def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
+    """Link corners of the hull with the outside, which faces away from the mean: tets behind faces may be flat."""
+    tet, opposite = np.nonzero(tets.neighbors < 0)
+    faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
+    a, b, c = places[faces].transpose(1, 0, 2)
+    outward = unit(np.cross(b - a, c - a))
+    outward *= np.sign((outward * (a - places.mean(axis=0))).sum(axis=1))[:, None]
+    weights = _confidence(np.einsum("fj,fkj->fk", outward, axes[faces]))
+    return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
+
+
+def neighbors_agree(points: Floats, normals: Floats) -> bool:
+    """Say whether nowhere among (n, 3) points the normals of neighbours contradict each other.
+
+    Then whole components may face the wrong way, but no single points, for which balls would be needed. Normals that
+    point the same way never contradict each other, even where noise puts one point above the other.
+    """
+    links = _neighbor_links(points, normals, 1.0)
+    against = links.weights < 0
+    first, second = normals[links.tails[against]], normals[links.heads[against]]
+    return bool(((first * second).sum(axis=1) > SAME_WAY).all())
+
+
+def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
+    """Link neighbours as if on a circle: reflection in the plane midway between them maps one axis to the other."""
+    n, k = len(places), min(POINT_NEIGHBORS, len(places) - 1)
+    neighbors = PointTree(places).query(places, k=k + 1)[1].reshape(n, -1)[:, 1:]
+    tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
+    step = unit(places[heads] - places[tails])
+    first, second = axes[tails], axes[heads]
+    cosines = (first * second).sum(axis=1) - 2 * (first * step).sum(axis=1) * (second * step).sum(axis=1)
+    return Links(tails, heads, weight * _confidence(cosines))
+
+
+def spread_out(points: Floats, radii: Floats) -> Ints:
+    """Ids, ascending, of the points (n, d) that are kept: those not within the radius (n,) of any kept before them."""
+    tree = PointTree(points)
+    kept = np.ones(len(points), dtype=bool)
+    for begin in range(0, len(points), LISTED_AT_ONCE):
+        part = np.arange(begin, min(begin + LISTED_AT_ONCE, len(points)))
+        part = part[kept[part]]
+        near = tree.query_ball_point(points[part], radii[part])
+        ends = np.cumsum([0, *map(len, near)])
+        _keep_first(part, ends, np.concatenate([*map(np.asarray, near), np.zeros(0)]).astype(np.int64), kept)
+    return np.flatnonzero(kept)
+
+
+@compiled
+def _keep_first(ids: Ints, ends: Ints, near: Ints, kept: Bools) -> None:
+    """Unmark in `kept` the later neighbours ``near[ends[i]:ends[i + 1]]`` of each kept point ``ids[i]``."""
+    for i in range(len(ids)):
+        if kept[ids[i]]:
+            for k in range(ends[i], ends[i + 1]):
+                if near[k] > ids[i]:
+                    kept[near[k]] = False
