@@ -1,8 +1,9 @@
 """Run one job on many shapes, in worker processes that have a time limit and are replaced when they die.
 
 `concurrent.futures`, loky and Dask cannot stop a running task, and fail other tasks when a process dies. The workers
-use `subprocess`, because `multiprocessing` would run the user's script in each process. A process serves many tasks,
-because starting one takes two seconds.
+use `subprocess`, because `multiprocessing` would run the user's script in each process: Pebble, which has time limits,
+fails on scripts without a main guard, loses what a process says as it dies, and lets a task run on when the batch is
+killed. A process serves many tasks, because starting one takes two seconds.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy
@@ -26,13 +26,13 @@ from ..fields.field import Field
 from ..fields.solid_queries import Scaled
 from ..jobs import Progress, run_cancellable
 from ..methods import Method, Nearest, distance_to_nearest, nearest, sharpen_on, timed
-from ..packages import lazy_module
 from ..parallel import PointTree, in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
 from ..validation import array_of, flag, numbers, positive_steps, public_call
 from .band import Band
 from .blocks import BLOCK
 from .grid import Grid
+from .marching import zero_set
 from .nearest_nodes import Lattice, nearest_at_nodes
 from .stencil import padded_shape
 
@@ -175,8 +175,6 @@ def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
     first[unused:], shape[unused:] = pads * steps[unused:], np.array(values.shape) - 2 * pads
     return scale * distances_to(contour, first, steps, shape)
 
-
-measure: Any = lazy_module("skimage.measure", "contours")
 
 SIGN_BLUR = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Distances of balls, half spaces and boxes
@@ -392,8 +390,7 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
         return np.empty((0, 3)), none.reshape(0, 3), np.empty((0, 5), dtype=np.int32), none, none
     size = np.abs(values)
     compressed = np.where(values < 0, -1.0, 1.0) * (1.0 + size / (size + np.median(size[size > 0])))
-    contour = measure.marching_cubes(np.broadcast_to(compressed, (2,) * unused + values.shape), 0.0)
-    vertices, faces = contour[0].astype(np.float64), contour[1].astype(np.int64)
+    vertices, faces = zero_set(np.broadcast_to(compressed, (2,) * unused + values.shape))
     nodes = np.floor(vertices).astype(np.int64)
     along = vertices - nodes > 0.1  # compressed values cross edges from a third to two thirds
     axes, on_edge = along.argmax(axis=1), along.sum(axis=1) == 1
