@@ -238,6 +238,10 @@ class Geodesic(Method):
         return distance_to_nearest(discretization, values, source, None, self.tolerance, progress)
 
 
+SOURCE_TOLERANCE = 0.1 * Geodesic.tolerance
+"""Tolerance of distance to curves: the order of faces then changes it by less than 1e-6 of its range."""
+
+
 @dataclass(frozen=True)
 class Convex(Method):
     """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
@@ -365,8 +369,7 @@ def sharpened(
     if source is None:
         run = partial(method.sharpened, discretization, elements, values, field.source, progress)
     else:
-        tolerance = 0.1 * Geodesic.tolerance  # the order of faces then changes distance by less than 1e-6 of its range
-        run = partial(distance_to_nearest, discretization, values, field.source, source, tolerance, progress)
+        run = partial(distance_to_nearest, discretization, values, field.source, source, SOURCE_TOLERANCE, progress)
     new, diagnostics = timed(run, field.diagnostics, progress)
     worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + ADDED_SLOPE_ERROR
     errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new), worse)

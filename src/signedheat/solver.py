@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from typing import Any, Generic, Literal, NamedTuple, TypeVar, cast, overload
 
-from .arrays import Frozen, Ints, LastUsed
+from .arrays import Floats, Frozen, Ints, LastUsed
 from .constraints import Constraint, LevelValues, ZeroSet
 from .diagnostics import Diagnostics, Note
 from .discretization import Adaptable, Discretization, SourceTerm, discretize
@@ -26,6 +26,7 @@ from .surfaces.intrinsic_triangulation import triangle_mesh
 from .surfaces.repaired_mesh import RepairedMesh
 from .surfaces.source_segments import given_curves, numbers_kept, one_sided
 from .surfaces.surface_curves import CurvesAndPoints
+from .surfaces.surface_source import SurfaceSource
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 from .validation import callback, positive_number, public_call, refuse_pair_apart
@@ -326,6 +327,23 @@ def with_discretization(solver: SignedHeatSolver[AnyDomain], made: Adaptable) ->
     other = replace(solver)
     other._made(None, lambda: made)
     return other
+
+
+def field_without_heat(
+    solver: SignedHeatSolver[AnySurface],
+    curves: CurvesAndPoints,
+    measure: Callable[[SurfaceSource], tuple[Floats, tuple[Note, ...]] | None],
+) -> Field[AnySurface] | None:
+    """Make a field of values at all vertices of the triangles that curves are lowered to; None if there are none."""
+    stopwatch = Stopwatch(None, steps=1)
+    with stopwatch("distance"):
+        discretization, terms, notes, _ = solver._prepared(curves, ZeroSet())
+        source = cast("SurfaceSource", terms[0])
+        measured = measure(source)
+    if measured is None:
+        return None
+    values, more = measured
+    return to_field(discretization, values, source, Diagnostics(dict(stopwatch.seconds), notes=(*notes, *more)))
 
 
 def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any], names: Ints) -> None:

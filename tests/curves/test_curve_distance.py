@@ -287,3 +287,59 @@ def test_more_points_on_the_same_lines_change_nothing(times):
         assert finer[-1].n_points == times * (piece.n_points - 1) + 1
     coarse, fine = (sh.signed_distance(curves, mesh).values for curves in (pieces, finer))
     np.testing.assert_allclose(fine, coarse, atol=1e-6 * np.ptp(coarse))
+
+
+def at_height(mesh, height):
+    return mesh.level_set(mesh.vertices[:, 2], height)
+
+
+def two_balls():
+    ball = sphere(2)
+    vertices = np.concatenate([ball.vertices, ball.vertices + np.array([4, 0, 0])])
+    return sh.TriangleMesh(vertices, np.concatenate([ball.faces, ball.faces + ball.n_vertices]))
+
+
+DECIDING = {
+    "loop": lambda: (globe := sphere(3), at_height(globe, 0.3)),
+    "band": lambda: (globe := sphere(3), [*at_height(globe, 0.4), *(c.reversed() for c in at_height(globe, -0.3))]),
+    "loop and point": lambda: (globe := sphere(3), [*at_height(globe, 0.3), globe.points_at(7)]),
+    "from rim to rim": lambda: (plate := disk(6), plate.level_set(plate.vertices[:, 1], 0.13)),
+    "points alone": lambda: (globe := sphere(3), [globe.points_at([3, 50])]),
+    "one of two parts": lambda: (both := two_balls(), at_height(both, 0.3)[:1]),
+    "along edges": lambda: (globe := sphere(3), [globe.path(globe.faces[0], closed=True)]),
+}
+"""Curves that lack nothing, and sources without sides, with the mesh that they lie on."""
+
+
+@pytest.mark.filterwarnings("ignore:no source is connected")
+@pytest.mark.parametrize("name", DECIDING)
+def test_no_heat_where_curves_decide_all_sides(name, monkeypatch):
+    """The same values as after diffusion, up to the rounding of other triangles, without a system that is solved."""
+    mesh, curves = DECIDING[name]()
+    expected = sh.sharpen(sh.SignedHeatSolver(mesh).distance(curves), curves).values
+
+    def refuse(*_, **__):
+        raise AssertionError("a system was solved")
+
+    for step in ("diffuse", "integrate"):
+        monkeypatch.setattr(f"signedheat.solver.{step}", refuse)
+    np.testing.assert_allclose(sh.signed_distance(curves, mesh).values, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("curves", ["gap", "figure of eight", "loop around a handle"])
+def test_heat_where_curves_leave_sides_open(curves, monkeypatch):
+    mesh = torus(n_around=48, n_across=24) if curves == "loop around a handle" else disk(12)
+    angle = np.linspace(0, 2 * np.pi, 40)[: 30 if curves == "gap" else -1]
+    if curves == "gap":
+        given = mesh.polyline(0.5 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1))
+    elif curves == "figure of eight":
+        given = mesh.polyline(0.6 * np.stack([np.sin(angle), np.sin(2 * angle), 0 * angle], axis=1), closed=True)
+    else:
+        given = mesh.path(np.arange(24), closed=True)
+
+    def refuse(*_, **__):
+        raise InterruptedError
+
+    monkeypatch.setattr("signedheat.solver.diffuse", refuse)
+    with pytest.raises(InterruptedError):
+        sh.signed_distance(given, mesh)

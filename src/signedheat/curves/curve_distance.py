@@ -20,13 +20,15 @@ from ..fields.sharpening import sharpen
 from ..jobs import Progress
 from ..mesh.components import connected_components, grouped
 from ..mesh.welding import GAP_UNITS, SEAM_UNITS, joined_rims
+from ..methods import SOURCE_TOLERANCE
 from ..shapes.foreign import as_list
 from ..shapes.kinds import AnySurface, SurfaceDomain
-from ..solver import SignedHeatSolver, distance_unwarned
+from ..solver import SignedHeatSolver, distance_unwarned, field_without_heat
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
+from ..surfaces.surface_sharpening import distance_without_heat
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
@@ -275,16 +277,31 @@ def distance_to_curves(
     listed, left_out = given_curves(solver.domain, given)
 
     is_default = intrinsic == "auto"
-    pieces = None if is_default or as_oriented else pieces_for_all(solver.domain, flattened(listed))
+    numbers = numbers_given(listed, left_out)
 
-    def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints]:
+    def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints | None]:
+        by = triangulated_once(by, flattened(listed))
+        exact = distance_by_sides(by, listed, progress)
+        if exact is not None:
+            return exact, None
         if as_oriented:
             return distance_unwarned(by, given, constraint), listed
-        return distance_to_pieces(by, listed, constraint, every_piece, numbers_given(listed, left_out), pieces)
+        pieces = None if is_default else pieces_for_all(solver.domain, flattened(listed))
+        return distance_to_pieces(by, listed, constraint, every_piece, numbers, pieces)
 
     field, taken = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
     rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
-    sharpened = sharpen(field, taken, progress=rest)
+    sharpened = field if taken is None else sharpen(field, taken, progress=rest)
     if repaired is not None:
         sharpened = repaired.on_given(sharpened)
     return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))
+
+
+def distance_by_sides(
+    solver: SignedHeatSolver[Any], curves: CurvesAndPoints, progress: Progress | None
+) -> Field[Any] | None:
+    """Return the distance to curves that decide by themselves which side every vertex is on; None if heat must."""
+    if not isinstance(solver.domain, TriangleMesh):
+        return None
+    report = None if progress is None else (lambda: progress(0.7, "distance"))
+    return field_without_heat(solver, curves, lambda source: distance_without_heat(source, SOURCE_TOLERANCE, report))

@@ -12,7 +12,7 @@ from itertools import chain
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints, mask_of
-from ..diagnostics import GeodesicWindows, SharpenedToCurves
+from ..diagnostics import GeodesicWindows, Note, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, percent, warn_user
 from ..fields.field import Field
@@ -175,6 +175,35 @@ def nearest_curve(
     return Nearest(distance, side, (note, note_on_searches(triangles, *counts)))
 
 
+def distance_without_heat(
+    source: SurfaceSource, tolerance: float, report: Report | None
+) -> tuple[Floats, tuple[Note, ...]] | None:
+    """Measure signed distance to curves that decide the sides of all vertices; None if they do not.
+
+    It equals `nearest_curve`, which then needs no φ.
+    """
+    triangles, parts = source.triangles, source.parts
+    placed = PlacedSegments.of(triangles, parts)
+    decided: tuple[Note, ...] = ()
+    side = np.ones(triangles.n_vertices, dtype=np.int64)
+    if any(part.oriented for part in parts):
+        if len(free_ends(triangles, placed)):
+            return None
+        side = curve_sides(triangles, placed).regions
+        reached = connected_to(triangles, placed.faces)
+        if (reached & (side == 0) & ~on_curves(triangles, placed)).any():
+            return None
+        decided = (SharpenedToCurves(0.0, 0, float((side != 0).mean())),)
+    distance, windows = distance_to_segments(triangles, placed, tolerance, report)
+    return np.where(side < 0, -distance, distance), (*decided, note_on_searches(triangles, windows))
+
+
+def connected_to(triangles: IntrinsicMesh, faces: Ints) -> Bools:
+    """(n,) vertices of the faces that are connected to some of them."""
+    parts = triangles.face_components
+    return mask_of(triangles.n_vertices, triangles.corner_vertices[np.isin(parts, parts[faces])])
+
+
 def missing_parts(
     triangles: IntrinsicMesh,
     values: Floats,
@@ -255,7 +284,7 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
     nearby, reach = nearest_sides(triangles, placed, ends)
     oriented = placed.sides != 0
     nodes = placed.nodes[np.unique(placed.ends[oriented])]
-    on_curve = mask_of(triangles.n_vertices, nodes.elements[nodes.kinds == VERTEX])
+    on_curve = on_curves(triangles, placed)
     tail, head = triangles.edges.vertices.T
     is_open = ~(on_curve[tail] | on_curve[head])
     is_open[nodes.elements[nodes.kinds == EDGE]] = False
@@ -267,6 +296,12 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
         reached[:, region[around]] = True
     side = reached[0].astype(np.int64) - reached[1]
     return CurveSides(np.where(on_curve, 0, side[region]), np.where(on_curve, 0, nearby), reach, ends)
+
+
+def on_curves(triangles: IntrinsicMesh, placed: PlacedSegments) -> Bools:
+    """(n,) whether a vertex is a node of oriented curves."""
+    nodes = placed.nodes[np.unique(placed.ends[placed.sides != 0])]
+    return mask_of(triangles.n_vertices, nodes.elements[nodes.kinds == VERTEX])
 
 
 def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
