@@ -4,7 +4,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE  # each of a hundred processes of the tests would compile the package again
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --only-binary=:all:
 
-.PHONY: help blender demo docs paper test fuzz lint types conformance coverage matrix dist clean
+.PHONY: help blender demo docs paper test fuzz lint types conformance coverage matrix dist wheel clean
 
 help:  # what there is to make
 	@sed -nE 's/^([a-z]+):[^#]*(# )?(.*)/  \1  \3/p' $(MAKEFILE_LIST) | awk '{name = $$1; $$1 = ""; printf "  make %-12s%s\n", name, $$0}'
@@ -72,6 +72,9 @@ blender:  # the add-on, to be installed from disk in Blender 4.2 and later
 dist: $(VENV)/.installed  # a wheel and a source archive in dist/
 	rm -rf dist
 	$(BIN)/python -m hatchling build
+
+wheel: $(VENV)/.installed  # a wheel in dist/ for this Python and Numba, with everything compiled
+	SIGNEDHEAT_KERNELS=1 $(BIN)/python -m hatchling build -t wheel
 
 clean:  # remove everything that these make
 	rm -rf $(VENV) .venv-matrix demo dist docs/_build docs/api docs/gallery htmlcov .coverage .hypothesis .mypy_cache .pytest_cache .ruff_cache

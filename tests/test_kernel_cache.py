@@ -144,6 +144,64 @@ def test_no_folder_can_be_written(tmp_path, shifted, monkeypatch):
     assert not list(tmp_path.rglob("*.nbc"))
 
 
+@pytest.fixture
+def carried(tmp_path, monkeypatch):
+    """The folder of kernels as a wheel carries them."""
+    if compiled._kind_of_code() is None:
+        pytest.skip("this processor does not run what wheels carry, or other code is asked for")
+    (tmp_path / "scaling.py").write_text(SCALING.format(factor=2.0))
+    (tmp_path / "shifting.py").write_text(SHIFTING.format(shift=1.0))
+    baseline = {"NUMBA_CPU_NAME": compiled.BASELINE, "NUMBA_CPU_FEATURES": ""}
+    environment = {**os.environ, **baseline, "NUMBA_CACHE_DIR": str(tmp_path / "wheel")}
+    command = [sys.executable, "-c", "import shifting; shifting.shifted(3.0)"]
+    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    monkeypatch.setattr(compiled, "CARRIED", tmp_path / "wheel" / "signedheat")
+    return compiled.CARRIED
+
+
+def test_kernels_that_a_wheel_carries_are_not_compiled(carried, cache, shifted, caplog, monkeypatch):
+    monkeypatch.setattr(compiled, "announce", type(compiled.announce)("compiling what this needs"))
+    with caplog.at_level("INFO", logger="signedheat"):
+        assert shifted() == (7.0, []) and not caplog.records
+    assert {path.parent.name for path in cache.rglob("*.nbc")} == {path.name for path in carried.iterdir()}
+    assert shifted(shift=2.0) == (8.0, ["shifted"])  # what it does not carry is compiled
+
+
+def test_kernels_that_a_wheel_carries_need_no_folder_that_can_be_written(carried, shifted, tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    monkeypatch.setattr(compiled, "_folder_beside_the_source", lambda: tmp_path / "file")
+    monkeypatch.setattr(Kernel, "is_kept", True)
+    assert shifted() == (7.0, [])
+
+
+@pytest.mark.parametrize("kind", ["*.nbi", "*.nbc"])
+def test_damaged_kernels_in_a_wheel_are_compiled_again(carried, cache, shifted, kind):
+    for path in carried.rglob(kind):
+        path.write_bytes(b"x" * 100)
+    value, told = shifted()
+    assert value == 7.0 and told[-2:] == ["scaled", "shifted"]
+
+
+def test_other_processors_compile_what_a_wheel_carries_and_say_so(carried, tmp_path):
+    code = f"""
+        from pathlib import Path
+        from signedheat import compiled
+        compiled.CARRIED = Path({str(carried)!r})
+        import shifting
+        assert shifting.shifted(3.0) == 7.0
+        print(len(shifting.shifted.dispatcher.stats.cache_misses))
+    """
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "own")}
+    for more, misses in ({}, "0"), ({"NUMBA_CPU_NAME": "generic"}, "1"):
+        command = [sys.executable, "-c", textwrap.dedent(code)]
+        done = subprocess.run(
+            command, cwd=tmp_path, env={**environment, **more}, capture_output=True, text=True, check=True
+        )
+        assert done.stdout.strip() == misses
+        assert ("compiling what this needs" in done.stderr) == (misses == "1")
+
+
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="sets limits of the system's")
 def test_full_disk(cache, tmp_path, shifted):
     """As one that takes no more than empty files."""

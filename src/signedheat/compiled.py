@@ -1,8 +1,12 @@
 """Kernels: functions that Numba compiles at their first call, so that importing them does not import Numba.
 
 Numba's own cache keeps compiled code on disk, and recognises a kernel by the text of its file. But a kernel also
-contains the kernels that it calls, and constants of other files. Therefore the cache's folder is named by a digest of
-all of these. It is made of the imported code, since files may have been edited before a kernel is first called.
+contains the kernels that it calls, and constants of other files. Therefore it is kept by a digest of all of these.
+It is made of the imported code, since files may have been edited before a kernel is first called. Numba finds the
+folder by its documented setting CACHE_LOCATOR_CLASSES, which names `KernelLocator` while a dispatcher is made.
+
+A wheel may carry kernels, compiled for `BASELINE`. They are copied to the cache where the processor can run them, and
+listed there as Numba would list its own, so that nothing else in the process is compiled differently.
 """
 
 from __future__ import annotations
@@ -10,13 +14,14 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import pickle
 import re
 import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from pickle import UnpicklingError
 from threading import RLock
 from types import CodeType
 from typing import Any, Generic, ParamSpec, TypeVar, overload
@@ -29,6 +34,9 @@ from .packages import lazy_module
 
 numba: Any = lazy_module("numba", "compiled kernels")
 extending: Any = lazy_module("numba.extending", "compiled kernels")
+numba_registry: Any = lazy_module("numba.core.registry", "compiled kernels")
+numba_serialize: Any = lazy_module("numba.core.serialize", "compiled kernels")
+llvmlite: Any = lazy_module("llvmlite.binding", "compiled kernels")
 
 logger: logging.Logger = logging.getLogger("signedheat")
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -36,8 +44,16 @@ OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrap
 SHORT = 1 << 13
 """Number of entries of arrays up to which a kernel is too short for anybody to interrupt it."""
 WORD = re.compile(r"\w+")
-DAMAGE = OSError, EOFError, UnpicklingError
+DAMAGE = OSError, EOFError, pickle.UnpicklingError
 """Errors of a cache whose files are damaged or cannot be written. Kernels raise none of them."""
+BASELINE = "x86-64-v3"
+"""Processors that the kernels of wheels are compiled for: level 3 of the x86-64 ABI, most made since 2013."""
+BASELINE_FEATURES = "avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "xsave"
+"""What LLVM calls the features of level 3, without those that AVX implies."""
+CARRIED = Path(__file__).parent / "kernels"
+"""Folder of the kernels that a wheel carries, which `make wheel` fills."""
+_names: dict[Callable[..., Any], str] = {}
+"""Names of the folders of the functions of which dispatchers are being made."""
 _lock = RLock()
 Parameters = ParamSpec("Parameters")
 Returned = TypeVar("Returned")
@@ -105,32 +121,17 @@ class Kernel(Generic[Parameters, Returned]):
             if numba.config.DISABLE_JIT:
                 return self.function
             if Kernel.is_kept and Path(self.function.__code__.co_filename).is_file():  # not code typed into a console
-                folder = cache_folder() / (_digest(self) + ("" if called_by_python else "_part"))
-                if not any(folder.glob("*/*.nbi")):
-                    announce()
-                wanted, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(folder)
+                name = _digest(self) + ("" if called_by_python else "_part")
                 try:
-                    return _of_numbers(numba.njit(cache=True, **options)(self.function))
+                    with kept_as(self.function, name):
+                        dispatcher = numba.njit(cache=True, **options)(self.function)
+                    if not has_code(name):
+                        announce()
+                    return dispatcher
                 except RuntimeError as error:  # no folder can be written to
                     logger.info("compiled in every process: %s", error)
-                finally:
-                    numba.config.CACHE_DIR = wanted
             announce()
-            return _of_numbers(numba.njit(**options)(self.function))
-
-
-def _of_numbers(dispatcher: Any) -> Any:
-    """Make a dispatcher compile for all numbers of a type when another kernel calls it with a literal number."""
-    compile_for = dispatcher.compile
-
-    def compile_once(signature: Any) -> Any:
-        if isinstance(signature, tuple):
-            written = numba.types.IntegerLiteral, numba.types.BooleanLiteral
-            signature = tuple(numba.types.unliteral(k) if isinstance(k, written) else k for k in signature)
-        return compile_for(signature)
-
-    dispatcher.compile = compile_once
-    return dispatcher
+            return numba.njit(**options)(self.function)
 
 
 @overload
@@ -145,7 +146,7 @@ def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
 
 def cache_folder() -> Path:
-    """Return the folder for compiled code; if it is not writable, Numba uses that of the source, or its own cache."""
+    """Return the folder for compiled code: what NUMBA_CACHE_DIR names, or else a folder in the user's cache."""
     wanted = os.environ.get("NUMBA_CACHE_DIR")
     if wanted:
         return Path(wanted) / "signedheat"
@@ -155,7 +156,122 @@ def cache_folder() -> Path:
             "darwin": Path.home() / "Library/Caches",
         }.get(sys.platform, os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
         return Path(base) / "signedheat" / "kernels"
-    return Path(__file__).parent / "__pycache__"
+    return _folder_beside_the_source()
+
+
+@contextmanager
+def kept_as(function: Callable[..., Any], name: str) -> Iterator[None]:
+    """Let Numba keep the compiled code of a function in the folder `name` if its dispatcher is made meanwhile."""
+    config = numba.config
+    before, config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES, f"{__name__}.{KernelLocator.__name__}"
+    _names[function] = name
+    try:
+        yield
+    finally:
+        del _names[function]
+        config.CACHE_LOCATOR_CLASSES = before
+
+
+def has_code(name: str) -> bool:
+    """Tell whether code is kept by a name."""
+    return any(any((root / name).glob("*.nbi")) for root in _roots(name))
+
+
+class KernelLocator:
+    """The first folder that can be written to, as Numba's cache asks for it."""
+
+    def __init__(self, folder: Path, file: str) -> None:
+        self._folder = folder
+        self._py_file = file  # Numba's warnings name it
+
+    @classmethod
+    def from_function(cls, function: Callable[..., Any], file: str) -> KernelLocator | None:
+        """Return a locator, or None if no folder can be written to."""
+        name = _names[function]
+        for root in _roots(name):
+            locator = cls(root / name, file)
+            try:
+                locator.ensure_cache_path()
+            except OSError:
+                continue
+            if not any(locator._folder.glob("*.nbi")):
+                _unpack(CARRIED / name, locator._folder)
+            return locator
+        return None
+
+    def ensure_cache_path(self) -> None:
+        """Make the folder, and raise an `OSError` if it cannot be written to."""
+        os.makedirs(self._folder, exist_ok=True)
+        tempfile.TemporaryFile(dir=self._folder).close()
+
+    def get_cache_path(self) -> str:
+        """Return the folder."""
+        return str(self._folder)
+
+    def get_source_stamp(self) -> str:
+        """Return what the code is made of."""
+        return self._folder.name
+
+    def get_disambiguator(self) -> str:
+        """Return nothing: each function has a folder of its own."""
+        return ""
+
+
+def _roots(name: str) -> Iterator[Path]:
+    """Yield the folders for compiled code, the best first."""
+    yield cache_folder()
+    yield _folder_beside_the_source()
+    if (CARRIED / name).is_dir() and _kind_of_code() is not None:
+        yield Path(_folder_of_this_process().name)
+
+
+def _folder_beside_the_source() -> Path:
+    return Path(__file__).parent / "__pycache__" / "kernels"
+
+
+@cache
+def _folder_of_this_process() -> tempfile.TemporaryDirectory[str]:
+    """Make a folder that is removed at the end."""
+    return tempfile.TemporaryDirectory(prefix="signedheat-")
+
+
+@cache
+def _kind_of_code() -> tuple[str, str, str] | None:
+    """Return how Numba describes code of this processor, or None where `BASELINE` does not run or is not wanted."""
+    config = numba.config
+    if config.CPU_NAME is not None or config.CPU_FEATURES is not None or not config.ENABLE_AVX:
+        return None
+    features = llvmlite.get_host_cpu_features()
+    if not all(features.get(feature) for feature in BASELINE_FEATURES):
+        return None
+    return numba_registry.cpu_target.target_context.codegen().magic_tuple()
+
+
+def _unpack(carried: Path, folder: Path) -> None:
+    """Copy the code of a kernel from a wheel, and list it as code of this processor.
+
+    The lists have the format of the version of Numba that wrote them: it is part of the name of the folder.
+    """
+    kind = _kind_of_code() if carried.is_dir() else None
+    if kind is None:
+        return
+    try:
+        for path in carried.glob("*.nbi"):
+            with path.open("rb") as index:
+                version, (stamp, files) = pickle.load(index), pickle.load(index)
+            files = {(types, kind, code): file for (types, made, code), file in files.items() if made[0] == kind[0]}
+            for file in files.values():
+                _replace(folder / file, (carried / file).read_bytes())
+            _replace(folder / path.name, pickle.dumps(version) + numba_serialize.dumps((stamp, files)))
+    except Exception as error:  # a damaged file raises errors of many types
+        logger.info("the kernels of the wheel are not used: %s", error)
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Write a file atomically, since other processes may do so, too."""
+    with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
+        file.write(content)
+    os.replace(file.name, path)
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:
@@ -228,4 +344,14 @@ def _prepare() -> None:
             remedy="unset it, or set it to 1 or more",
             element="NUMBA_NUM_THREADS",
         )
-    extending.typeof_impl.register(Kernel)(lambda kernel, _: numba.typeof(kernel.part))
+
+    class Part(numba.types.Dispatcher):  # type: ignore[misc]
+        """The type of a kernel in compiled code, which compiles it for all numbers of a type, not for literals."""
+
+        def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+            any_number = numba.types.unliteral
+            named = {name: any_number(value) for name, value in dict(kws).items()}
+            return super().get_call_type(context, tuple(map(any_number, args)), named)
+
+    extending.register_model(Part)(extending.models.OpaqueModel)
+    extending.typeof_impl.register(Kernel)(lambda kernel, _: Part(kernel.part))
