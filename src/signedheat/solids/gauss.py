@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -232,6 +233,19 @@ def _small_pieces(
             matrix[p, piece] = angle / (4.0 * np.pi)
 
 
+class Walk(NamedTuple):
+    """A tree of places, and the nodes by which it is summed at each group of them: see `_nodes_for`."""
+
+    places: Floats  # (n, 3) positions
+    softening: Floats  # (n,)
+    items: Ints  # the places in each leaf
+    balls: Floats  # (2 · leaves, 4) see `Dipoles.balls`
+    order: Ints  # (n,) the places in the order of the tree; each `together` of them are a group
+    starts: Ints  # (groups + 1,) where the nodes of each group begin
+    nodes: NDArray[np.int32]
+    together: int
+
+
 @dataclass(frozen=True, eq=False)
 class Dipoles:
     """The map W of many small faces or points, as dipoles softened at the scale of the distance to neighbours."""
@@ -307,8 +321,7 @@ class Dipoles:
         """(n,) winding numbers at the places, due to all other dipoles."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
-        known = self.places, self.softening, vectors, self.tree.items, self.balls, nodes
-        return self._at_places(partial(_potentials, *known)) / (4.0 * np.pi)
+        return self._at_places(partial(_potentials, self._walk, vectors, nodes)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) zeros, for the levels at the places due to their own group only: loose triangles have none."""
@@ -319,22 +332,22 @@ class Dipoles:
         away = self.places - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
-        known = self.places, self.softening, charges, self.tree.items, self.balls, nodes
-        field = self._at_places(partial(_fields, *known))
+        field = self._at_places(partial(_fields, self._walk, charges, nodes))
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
         return np.bincount(self.owners, flux).astype(np.float64)
 
     @cached_property
-    def _listed(self) -> tuple[Ints, Ints, NDArray[np.int32]]:
-        """Places in the order of the tree, and the nodes that count for each `PLACES_TOGETHER` of them: see `_list`."""
+    def _walk(self) -> Walk:
+        """The walk of the tree of all places, which no product changes."""
         order = self.tree.items[self.tree.items >= 0]
-        return order, *_list(self.places[order], self.balls, PLACES_TOGETHER)
+        nodes = _nodes_for(self.places[order], self.balls, PLACES_TOGETHER)
+        return Walk(self.places, self.softening, self.tree.items, self.balls, order, *nodes, PLACES_TOGETHER)
 
-    def _at_places(self, kernel: Callable[..., Floats]) -> Floats:
-        """(n, ...) values of a kernel of rows of the order of the tree, where neighbours have the same nodes."""
-        (found,) = in_chunks(lambda rows: (kernel(*self._listed, rows, PLACES_TOGETHER),), np.arange(len(self.places)))
+    def _at_places(self, kernel: Callable[[Ints], Floats]) -> Floats:
+        """(n, ...) values of a kernel of rows of the order of the tree, in which neighbours have the same nodes."""
+        (found,) = in_chunks(lambda rows: (kernel(rows),), np.arange(len(self.places)))
         values = np.empty_like(found)
-        values[self._listed[0]] = found
+        values[self._walk.order] = found
         return values
 
     def _sums(self, values: Floats) -> Floats:
@@ -380,7 +393,7 @@ def spacing(places: Floats) -> Floats:
 
 
 @compiled
-def _list(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
+def _nodes_for(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
     """List the nodes whose dipoles, in place of their boxes', count for each `together` places, and where lists begin.
 
     Nodes that all of the places are beyond are one dipole. Of leaves near some of them, minus the number is listed.
@@ -410,23 +423,12 @@ def _list(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[n
 
 
 @compiled
-def _potentials(
-    places: Floats,
-    softening: Floats,
-    vectors: Floats,
-    items: Ints,
-    balls: Floats,
-    nodes: Floats,
-    order: Ints,
-    starts: Ints,
-    listed: NDArray[np.int32],
-    rows: Ints,
-    together: int,
-) -> Floats:
+def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> Floats:
     """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all other dipoles v, where d points from the place to v.
 
-    The places are rows of `order`, from a multiple of `together` on; `listed` has the nodes that count: see `_list`.
+    The places are rows of the walk's order, from a multiple of `together` on.
     """
+    places, softening, items, balls, order, starts, nodes, together = walk
     leaves, result = len(balls) // 2, np.empty(len(rows))
     x, y, z, sums = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
     for begin in range(0, len(rows), together):
@@ -434,10 +436,10 @@ def _potentials(
             p = order[rows[min(begin + k, len(rows) - 1)]]
             x[k], y[k], z[k], sums[k] = places[p, 0], places[p, 1], places[p, 2], 0.0
         group = rows[begin] // together
-        for node in listed[starts[group] : starts[group + 1]]:
+        for node in nodes[starts[group] : starts[group + 1]]:
             if node > 0:
                 ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
-                vx, vy, vz = nodes[node, 0], nodes[node, 1], nodes[node, 2]
+                vx, vy, vz = sums_below[node, 0], sums_below[node, 1], sums_below[node, 2]
                 for k in range(together):
                     dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
                     square = dx * dx + dy * dy + dz * dz
@@ -460,20 +462,9 @@ def _potentials(
 
 
 @compiled
-def _fields(
-    places: Floats,
-    softening: Floats,
-    charges: Floats,
-    items: Ints,
-    balls: Floats,
-    nodes: Floats,
-    order: Ints,
-    starts: Ints,
-    listed: NDArray[np.int32],
-    rows: Ints,
-    together: int,
-) -> Floats:
+def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floats:
     """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all other charges c; d points from c to the place, which has ε."""
+    places, softening, items, balls, order, starts, nodes, together = walk
     leaves, result = len(balls) // 2, np.empty((len(rows), 3))
     x, y, z, soft = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
     fx, fy, fz = np.empty(together), np.empty(together), np.empty(together)
@@ -483,10 +474,11 @@ def _fields(
             x[k], y[k], z[k], soft[k] = places[p, 0], places[p, 1], places[p, 2], softening[p] ** 2
             fx[k], fy[k], fz[k] = 0.0, 0.0, 0.0
         group = rows[begin] // together
-        for node in listed[starts[group] : starts[group + 1]]:
+        for node in nodes[starts[group] : starts[group + 1]]:
             if node > 0:
                 ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
-                charge, mx, my, mz = nodes[node, 0], nodes[node, 1], nodes[node, 2], nodes[node, 3]
+                charge, mx = sums_below[node, 0], sums_below[node, 1]
+                my, mz = sums_below[node, 2], sums_below[node, 3]
                 for k in range(together):
                     dx, dy, dz = x[k] - ax, y[k] - ay, z[k] - az
                     square = dx * dx + dy * dy + dz * dz
