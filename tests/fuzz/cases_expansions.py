@@ -13,8 +13,9 @@ import signedheat as sh
 from expanding_files import EXPANSIONS
 from fuzz.frame import Wrong, family
 
-SECONDS, MEMORY = 12.0, 1 << 31
-"""Processor time and memory that a file may take: budgets are 10 s, and what is free."""
+SECONDS, BYTES = 12.0, 1 << 30
+"""Processor time and memory that a file may take: budgets are 10 s, and at most so many bytes; memory is seen to be
+within twice as many."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +33,11 @@ class Expanding:
 
 
 def build(random: np.random.Generator, folder: Path) -> Expanding:
-    """A file of any number of levels, within a budget or none."""
+    """A file of any number of levels, within a budget of memory, and often of something else."""
     kind = str(random.choice(list(EXPANSIONS)))
     name, write, _, levels = EXPANSIONS[kind]
     write(folder / name, int(random.integers(0, levels + 1)))
-    limits: dict[str, Any] = {}
+    limits: dict[str, Any] = {"bytes": BYTES, "seconds": 10.0}
     if random.random() < 0.5:
         limit = str(random.choice(["bytes", "elements", "points", "seconds"]))
         limits[limit] = 10.0 ** random.uniform(-3, 1) if limit == "seconds" else int(10.0 ** random.uniform(0, 9))
@@ -59,4 +60,4 @@ def check(given: Expanding) -> str:
     return kind
 
 
-family("expansions", build, check, memory=MEMORY)
+family("expansions", build, check, memory=2 * BYTES)

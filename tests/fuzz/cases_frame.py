@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,10 @@ from signedheat.errors import GeometryError
 def build(random: np.random.Generator, folder: Path) -> float:
     """A number."""
     return float(random.random())
+
+
+def _say(word: str, _: float) -> str:
+    return word
 
 
 def _refuse(_: float) -> str:
@@ -49,7 +54,7 @@ def _grow(number: float) -> str:
     return "grown" if np.full(1 << 23, number).any() else "empty"
 
 
-family("frame right", build, lambda number: "fine")
+family("frame right", build, partial(_say, "fine"))
 family("frame refused", build, _refuse)
 family("frame wrong", build, _wrong)
 family("frame exception", build, lambda number: {}[str(number)])

@@ -90,6 +90,11 @@ class Family:
     check: Callable[[Any], str]
     memory: int = MEMORY
 
+    @property
+    def module(self) -> str:
+        """The module that registers the family, which a worker imports; a check may be a `partial`."""
+        return str(getattr(self.check, "func", self.check).__module__)
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -281,7 +286,7 @@ def run(
     """Run `cases` cases of each of some families, on `workers` processes; `tell` is called with every outcome."""
     jobs = ((name, seed, number) for number in range(cases) for name in names)
     tally, left = Tally(), cases * len(names)
-    modules = sorted({families()[name].check.__module__ for name in names})
+    modules = sorted({families()[name].module for name in names})
     crew = [Worker(modules) for _ in range(workers)]
     try:
         while left:

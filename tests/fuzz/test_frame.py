@@ -32,6 +32,10 @@ def test_every_kind_of_end_is_told(tally, name):
     assert sum(tally.counts[f"frame {name}"].values()) == 1
 
 
+def test_workers_know_families_whose_checks_are_partial():
+    assert set(run(["frame right"], cases=1).counts["frame right"]) == EXPECTED["right"]
+
+
 def test_a_case_comes_again_by_its_seed(tally):
     once = next(outcome for outcome in tally.failures if outcome.family == "frame wrong")
     again = run_case(families()["frame wrong"], once.seed, once.number)
