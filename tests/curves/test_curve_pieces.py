@@ -172,3 +172,13 @@ def test_loops_side_by_side_that_run_alike_agree(radii):
     clear = (away < min(radii) - 0.05) | (away > max(radii) + 0.05)
     assert (np.sign(phi.values) == np.sign(np.mean(radii) - away))[clear].all()
     assert phi.diagnostics.note(CurvesTaken) is None or not phi.diagnostics.note(CurvesTaken).turned
+
+
+@pytest.mark.parametrize("intrinsic", [True, False, "auto"])
+def test_progress_never_goes_back(mesh, pieces, intrinsic):
+    told: list[float] = []
+    small = [circle(mesh, 0.05, k / 3, k / 3 + 0.3) for k in range(3)]  # these get triangles of their own
+    for curves in (pieces, small):
+        sh.signed_distance(curves, mesh, intrinsic=intrinsic, progress=lambda done, step: told.append(done))
+        assert told == sorted(told) and told[-1] == 1.0
+        told.clear()

@@ -21,7 +21,7 @@ from fuzz.frame import PATIENCE, Wrong, family
 from signedheat import samples
 
 LATEST = 1.0
-"""Seconds until a call has ended after Ctrl-C, on the clock and of a processor: beside other work it may take longer."""
+"""Seconds until a call has ended after Ctrl-C, on the clock and of a processor, since other work delays it."""
 LONGEST = 30.0
 """Seconds until threads that nobody waits for have ended."""
 

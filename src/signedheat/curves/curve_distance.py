@@ -17,13 +17,13 @@ from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, percent, warn_user
 from ..fields.field import Field
 from ..fields.sharpening import sharpen
-from ..jobs import Progress
+from ..jobs import Progress, within
 from ..mesh.components import connected_components, grouped
 from ..mesh.welding import GAP_UNITS, SEAM_UNITS, joined_rims
 from ..methods import SOURCE_TOLERANCE
 from ..shapes.foreign import as_list
 from ..shapes.kinds import AnySurface, SurfaceDomain
-from ..solver import SignedHeatSolver, distance_unwarned, field_without_heat
+from ..solver import SignedHeatSolver, distance_unwarned, field_without_heat, with_discretization
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
@@ -119,8 +119,10 @@ def distance_to_pieces(
     surface_of(solver).segments(listed)  # refuses curves that do not fit
     once = triangulated_once(solver, listed)
     pieces = pieces or CurvePieces.of(surface_of(once), listed)
+    # triangles have been made, and what follows until distance is measured reports nothing
+    once = with_discretization(replace(once, progress=within(solver.progress, 0.4, 1.0)), once.discretization)
     if pieces is None:
-        return distance_unwarned(solver, listed, constraint), listed
+        return distance_unwarned(once, listed, constraint), listed
     if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):
         if pieces.is_piece.any():
             warn_user(
@@ -129,7 +131,7 @@ def distance_to_pieces(
                 "is a guess. Leave out faces, or close the curves",
                 InexactWarning,
             )
-        return distance_unwarned(solver, listed, constraint), listed
+        return distance_unwarned(once, listed, constraint), listed
     decision = decide(pieces, every_piece)
     turn = decision.turned(len(listed))
     left_out = pieces.curves(decision.loose)
