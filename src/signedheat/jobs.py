@@ -88,6 +88,20 @@ def within(progress: Progress | None, start: float, stop: float) -> Progress | N
     return lambda fraction, step: whole(start + fraction * (stop - start), step)
 
 
+def growing(progress: Progress | None) -> Progress | None:
+    """Return a callback that reports the largest fraction so far, where parts of a computation may be done again."""
+    if progress is None:
+        return None
+    whole, most = progress, 0.0
+
+    def report(fraction: float, step: str) -> None:
+        nonlocal most
+        most = max(most, fraction)
+        whole(most, step)
+
+    return report
+
+
 ENTRY_PROGRAM = (
     "import json, sys; sys.path[:] = json.loads(sys.argv[1]); from importlib import import_module; "
     "module, name = sys.argv[2].split(':'); getattr(import_module(module), name)(*sys.argv[3:])"

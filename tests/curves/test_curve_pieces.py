@@ -178,7 +178,8 @@ def test_loops_side_by_side_that_run_alike_agree(radii):
 def test_progress_never_goes_back(mesh, pieces, intrinsic):
     told: list[float] = []
     small = [circle(mesh, 0.05, k / 3, k / 3 + 0.3) for k in range(3)]  # these get triangles of their own
-    for curves in (pieces, small):
+    whole = [circle(mesh, 0.6, k / 6, (k + 1) / 6) for k in range(6)]
+    for curves in (pieces, small, whole):
         sh.signed_distance(curves, mesh, intrinsic=intrinsic, progress=lambda done, step: told.append(done))
         assert told == sorted(told) and told[-1] == 1.0
         told.clear()

@@ -17,13 +17,13 @@ from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, percent, warn_user
 from ..fields.field import Field
 from ..fields.sharpening import sharpen
-from ..jobs import Progress, within
+from ..jobs import Progress, growing, within
 from ..mesh.components import connected_components, grouped
 from ..mesh.welding import GAP_UNITS, SEAM_UNITS, joined_rims
 from ..methods import SOURCE_TOLERANCE
 from ..shapes.foreign import as_list
 from ..shapes.kinds import AnySurface, SurfaceDomain
-from ..solver import SignedHeatSolver, distance_unwarned, field_without_heat, with_discretization
+from ..solver import SignedHeatSolver, distance_unwarned, field_without_heat
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
@@ -119,8 +119,6 @@ def distance_to_pieces(
     surface_of(solver).segments(listed)  # refuses curves that do not fit
     once = triangulated_once(solver, listed)
     pieces = pieces or CurvePieces.of(surface_of(once), listed)
-    # triangles have been made, and what follows until distance is measured reports nothing
-    once = with_discretization(replace(once, progress=within(solver.progress, 0.4, 1.0)), once.discretization)
     if pieces is None:
         return distance_unwarned(once, listed, constraint), listed
     if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):
@@ -269,7 +267,8 @@ def distance_to_curves(
             remedy="use SignedHeatSolver.distance",
         )
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
-    share = None if progress is None else (lambda done, step: progress(0.7 * done, step))
+    progress = growing(progress)  # triangles may be made twice, and sides decided before distance is measured
+    share = within(progress, 0.0, 0.7)
     solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
     given = as_curves(solver.domain, as_list(curves))
     warn_of_gaps(solver.domain)
@@ -292,8 +291,9 @@ def distance_to_curves(
         return distance_to_pieces(by, listed, constraint, every_piece, numbers, pieces)
 
     field, taken = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
-    rest = None if progress is None else (lambda done, step: progress(0.7 + 0.3 * done, step))
-    sharpened = field if taken is None else sharpen(field, taken, progress=rest)
+    sharpened = field if taken is None else sharpen(field, taken, progress=within(progress, 0.7, 1.0))
+    if taken is None and progress is not None:
+        progress(1.0, "done")
     if repaired is not None:
         sharpened = repaired.on_given(sharpened)
     return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))

@@ -20,7 +20,7 @@ from ..fields.solid_queries import Closest
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.marching import values_at_walls
 from ..grids.polyline import Polyline
-from ..jobs import Progress, Stopwatch, within
+from ..jobs import Progress, Stopwatch, growing, within
 from ..mesh.components import connected_components, sums_of
 from ..mesh.polylines import FillRule, without_seams
 from ..mesh.unit_vectors import unit
@@ -89,7 +89,8 @@ def distance_to_lines(
         if filled and all(line.closed for line in listed):
             drawing = Drawing(without_seams(segments_of_lines(listed)))
             return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)), progress)
-        listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece, within(progress, 0.0, 0.4))
+        share = within(growing(progress), 0.0, 0.4)
+        listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece, share)
         notes += [taken] if taken else []
     solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
     phi = cast("Field[Grid[Literal[2]]]", solver.distance(listed, constraint))
