@@ -32,23 +32,13 @@ def on_level(
     spacing: Floats,
     level: float,
 ) -> Floats:
-    """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space."""
-    places = np.empty(points.shape)
-    for begin in range(0, len(points), POINTS_AT_ONCE):
-        batch = slice(begin, begin + POINTS_AT_ONCE)
-        places[batch] = _moved(distance, points[batch], values, origin, spacing, level)
-    return places
+    """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space.
 
-
-def _moved(
-    distance: Callable[[Floats], Floats],
-    points: Floats,
-    values: NodeValues,
-    origin: Floats,
-    spacing: Floats,
-    level: float,
-) -> Floats:
-    """Do the work of `on_level` by regula falsi (Dowell & Jarratt 1971)."""
+    They are found by regula falsi (Dowell & Jarratt 1971).
+    """
+    if len(points) > POINTS_AT_ONCE:
+        parts = np.split(points, range(POINTS_AT_ONCE, len(points), POINTS_AT_ONCE))
+        return np.concatenate([on_level(distance, part, values, origin, spacing, level) for part in parts])
     base = np.floor(points).astype(np.int64)
     fraction = points - base
     axis = fraction.argmax(axis=1)
