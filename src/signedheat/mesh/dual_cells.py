@@ -21,8 +21,8 @@ flipped edges.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +49,11 @@ class Crossings:
     rising: Bools  # (e,) whether the first node is inside
     shares: Floats  # (e,) how far from the first node the crossing is, in cells
 
+    @classmethod
+    def joined(cls, parts: Sequence[Crossings]) -> Crossings:
+        """Join the crossings of several windows or axes."""
+        return cls(*(np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(cls)))
+
 
 @dataclass(frozen=True, eq=False)
 class DualCells:
@@ -69,6 +74,22 @@ class CrossedCells(NamedTuple):
     edges: NDArray[np.int32]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
     rows: NDArray[np.int32]  # (e, 4) the cells around each crossed edge, counter-clockwise as seen from its end
     sides: NDArray[np.int8]  # (e, 4) which of the 12 edges of each of these cells it is
+
+
+def crossings_in(heights: NDArray[np.floating], first: Ints) -> Crossings:
+    """Find the crossed edges between the nodes of a window of a grid, along each axis; nodes at NaN have none.
+
+    Heights are negative inside, and linear along edges.
+    """
+    below, held, parts = heights < 0, ~np.isnan(heights), []
+    for axis in range(3):
+        ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))
+        inner = (slice(0, -1),) * 3
+        nodes = np.argwhere((below[inner] != below[ahead]) & held[inner] & held[ahead])
+        low, high = (heights[ends][tuple(nodes.T)].astype(np.float64) for ends in (inner, ahead))
+        axes = np.full(len(nodes), axis, dtype=np.int8)
+        parts.append(Crossings((first + nodes).astype(np.int32), axes, low < 0, low / (low - high)))
+    return Crossings.joined(parts)
 
 
 def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:

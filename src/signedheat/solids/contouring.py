@@ -33,6 +33,7 @@ from ..mesh.dual_cells import (
     Crossings,
     DualCells,
     crossed_cells,
+    crossings_in,
     dual_cells,
     open_cells,
     separate_triangles,
@@ -447,7 +448,7 @@ def crossed_between(heights: Floats, grid: Grid) -> tuple[Crossings, CrossedCell
     parts: list[Crossings] = []
     for window in np.ndindex(*(-(-(n - 1) // side) for n in heights.shape)):  # in the order of `crossed_edges`
         first = side * np.array(window)
-        parts += crossings_in(heights[tuple(slice(begin, begin + side + 1) for begin in first)], first)
+        parts.append(crossings_in(heights[tuple(slice(begin, begin + side + 1) for begin in first)], first))
     crossings = joined_crossings(parts)
     refuse_large_contour(crossings, grid)
     return crossings, crossed_cells(crossings, grid.shape)
@@ -489,29 +490,15 @@ def crossed_edges(band: BlockValues) -> Crossings:
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * BLOCK, WINDOW * BLOCK
-        parts += crossings_in(band.window(first, (size + 1,) * 3), first)
+        parts.append(crossings_in(band.window(first, (size + 1,) * 3), first))
     return joined_crossings(parts)
 
 
-def crossings_in(heights: NDArray[np.floating], first: Ints) -> list[Crossings]:
-    """Find the crossed edges between the nodes of a window of a grid, along each axis; nodes at NaN have none."""
-    below, held, parts = heights < 0, ~np.isnan(heights), []
-    for axis in range(3):
-        ahead = tuple(slice(1, None) if k == axis else slice(0, -1) for k in range(3))
-        inner = (slice(0, -1),) * 3
-        nodes = np.argwhere((below[inner] != below[ahead]) & held[inner] & held[ahead])
-        low, high = (heights[ends][tuple(nodes.T)].astype(np.float64) for ends in (inner, ahead))
-        axes = np.full(len(nodes), axis, dtype=np.int8)
-        parts.append(Crossings((first + nodes).astype(np.int32), axes, low < 0, low / (low - high)))
-    return parts
-
-
 def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """Join the crossings of several windows and axes."""
+    """Join the crossings of several windows; refuse none at all."""
     if not any(len(part.axes) for part in parts):
         raise OutsideError(
             "the distance reaches the level nowhere between the nodes of the grid",
             remedy="choose another level, or smaller cells if the shape is thinner than they are",
         )
-    names = ("nodes", "axes", "rising", "shares")
-    return Crossings(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return Crossings.joined(parts)

@@ -25,7 +25,7 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.components import sums_of
-from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, dual_cells, separate_triangles
+from ..mesh.dual_cells import Crossings, DualCells, crossed_cells, crossings_in, dual_cells, separate_triangles
 from ..mesh.edges import EdgeTable
 from ..shapes.exchange import Displayed
 from ..validation import array_of, finite_number, frozen, numbers, positive_steps, refuse_extreme, refuse_lost_spacing
@@ -196,15 +196,13 @@ either."""
 def surface_net(volume: Bools) -> tuple[Floats, Ints]:
     """Make a smooth closed surface between voxels inside and outside; return vertices, in voxels, and triangles."""
     padded = np.pad(volume, 2)
-    nodes = [np.argwhere(np.diff(padded, axis=axis)) for axis in range(3)]
-    first, along = np.concatenate(nodes), np.repeat(np.arange(3), [len(part) for part in nodes])
-    crossings = Crossings(first, along, padded[tuple(first.T)], np.full(len(first), 0.5))
+    crossings = crossings_in(np.where(padded, -1.0, 1.0), np.zeros(3, dtype=np.int64))
     around = crossed_cells(crossings, padded.shape)
     cells = dual_cells(crossings, around, padded.shape, lambda places: np.ones(len(places), dtype=bool))
     middles, room = _rooms(cells, crossings)
     relaxed = _relaxed(cells.quads, middles, room)
-    rows = np.arange(len(first))
-    shares = relaxed[cells.quads, along[:, None]].mean(axis=1) - first[rows, along]
+    rows, along = np.arange(len(crossings.axes)), crossings.axes
+    shares = relaxed[cells.quads, along[:, None]].mean(axis=1) - crossings.nodes[rows, along]
     choices = np.stack([relaxed, 0.5 * (relaxed + middles), middles])
     crossings = replace(crossings, shares=np.clip(shares, 0.5 - LARGEST_MOVE, 0.5 + LARGEST_MOVE))
     vertices, faces = separate_triangles(cells, crossings, choices)
