@@ -400,18 +400,23 @@ def _nodes_for(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDAr
     """
     leaves, stack, count = len(balls) // 2, np.empty(64, dtype=np.int64), 0
     starts, nodes = np.zeros(-(-len(places) // together) + 1, dtype=np.int64), np.empty(leaves, dtype=np.int32)
+    x, y, z = np.empty(together), np.empty(together), np.empty(together)
     for begin in range(0, len(places), together):
         if count + leaves > len(nodes):
             more = np.empty(2 * len(nodes) + leaves, dtype=np.int32)
             more[:count] = nodes[:count]
             nodes = more
+        for k in range(together):
+            p = min(begin + k, len(places) - 1)
+            x[k], y[k], z[k] = places[p, 0], places[p, 1], places[p, 2]
         stack[0], depth = 1, 1
         while depth > 0:
             depth -= 1
             node, near = stack[depth], 0
-            for p in range(begin, min(begin + together, len(places))):
-                dx, dy, dz = balls[node, 0] - places[p, 0], balls[node, 1] - places[p, 1], balls[node, 2] - places[p, 2]
-                near += 1 if dx * dx + dy * dy + dz * dz <= balls[node, 3] else 0
+            ax, ay, az, square = balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3]
+            for k in range(together):
+                dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
+                near += 1 if dx * dx + dy * dy + dz * dz <= square else 0
             if near > 0 and node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
