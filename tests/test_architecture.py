@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -62,6 +63,12 @@ def test_each_constant_is_defined_in_one_module():
 
 
 SLOW_TO_IMPORT = ("numba", "matplotlib", "trimesh", "meshio", "skimage", "nibabel")
+
+
+def test_no_object_is_changed_behind_its_back():
+    """Only an object itself writes into its ``__dict__``."""
+    written = re.compile(r"(?<!self)\.__dict__(\[[^]]*\] =|\.\w+\()|vars\((?!self)\w+\)\.(update|pop)\(")
+    assert [file.name for file in PACKAGE.rglob("*.py") if written.search(file.read_text())] == []
 
 
 def test_no_circle_of_imports():

@@ -195,7 +195,8 @@ def take_inputs(arguments: Namespace, *names: str) -> None:
         del arguments.output[-missing:]
     if len(given) != len(names):
         arguments.parser.error(f"the following arguments are required: {', '.join(names).upper()}")
-    vars(arguments).update(zip(names, given, strict=True))
+    for name, path in zip(names, given, strict=True):
+        setattr(arguments, name, path)
 
 
 @command(
