@@ -321,3 +321,16 @@ def test_closest_points_are_closest():
     samples = np.einsum("sk,fkj->fsj", grid, corners).reshape(-1, 3)
     sampled = np.array([np.linalg.norm(samples - p, axis=1).min() for p in points])
     assert (distances <= sampled + 1e-12).all() and np.abs(distances - sampled).max() < 0.03
+
+
+@pytest.mark.parametrize("order", [None, 0], ids=["in order", "shuffled"])
+def test_polylines_run_as_ever_where_faces_are_there_both_ways(order):
+    ball = sh.samples.sphere(3)
+    faces = np.concatenate([ball.faces, ball.faces[:, ::-1]])
+    both = sh.TriangleMesh(ball.vertices, faces if order is None else np.random.default_rng(order).permutation(faces))
+    angle = np.linspace(0.1, 6, 60)
+    line = np.stack([0.8 * np.cos(angle), 0.8 * np.sin(angle), np.full(60, 0.6)], axis=1)
+    once, twice = ball.polyline(line), both.polyline(line)
+    assert np.allclose(both.positions(twice), ball.positions(once), rtol=0, atol=1e-12)
+    phi = sh.signed_distance(once, ball).values
+    assert np.allclose(abs(sh.signed_distance(twice, both).values), abs(phi), rtol=0, atol=1e-9)

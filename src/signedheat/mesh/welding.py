@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from .components import connected_components
-from .edges import find_edges
+from .edges import find_edges, pair_halfedges
 
 ONE_PLACE = 4.0
 """Largest difference between coordinates that count as one place, in units of single precision of the size of a part,
@@ -256,3 +256,22 @@ def _same_rows(rows: Ints) -> Ints:
             table[place] = row = i
         result[i] = row
     return result
+
+
+def copied_faces(faces: Ints, n_vertices: int) -> Ints:
+    """(m,) first face on the vertices of each face with an edge of more than two faces; elsewhere the face itself.
+
+    For a face that has a vertex twice, and so no area, it is one with the same vertices, if there is one.
+    """
+    first = np.arange(len(faces))
+    doubled = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
+    crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
+    if len(crowded):
+        copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
+        first[crowded] = np.where(copies < 0, crowded, crowded[copies])
+    for face in np.flatnonzero(doubled).tolist():
+        around = np.flatnonzero(np.isin(faces, faces[face]).sum(axis=1) >= len(set(faces[face].tolist())))
+        others = around[~doubled[around]]
+        first[face] = first[others[0]] if len(others) else face
+    return first

@@ -11,8 +11,8 @@ import numpy as np
 from ..arrays import Ints
 from ..diagnostics import Note
 from ..fields.field import Field
-from ..mesh.edges import orient_faces, pair_halfedges
-from ..mesh.welding import coincident_faces
+from ..mesh.edges import orient_faces
+from ..mesh.welding import copied_faces
 from .surface_curves import Curve, SurfacePoints
 from .surface_discretization import vertices_joined
 from .triangle_mesh import TriangleMesh
@@ -46,12 +46,9 @@ class RepairedMesh:
         """
         if not isinstance(given, TriangleMesh):
             return None
-        first, n = copied_faces(given.faces, given.n_vertices), given.n_vertices
-        if not agree and (first == np.arange(len(first))).all():
+        once, n = given.once, given.n_vertices  # beside a copy of its face, a rim looks like an edge of two faces
+        if not agree and once is given:
             return None
-        kept = np.unique(first)
-        # beside a copy of its face, a rim looks like an edge of two faces
-        once = given if len(kept) == given.n_faces else TriangleMesh(given.vertices, given.faces[kept])
         corners = once.places[given.faces]
         kept, targets = np.unique(copied_faces(corners, n), return_inverse=True)
         faces, areas = corners[kept], given.face_areas[kept]
@@ -90,22 +87,3 @@ class RepairedMesh:
         faces = np.unique(self.faces, return_index=True)[1][curve.faces]
         weights = np.take_along_axis(curve.barycentric, self.corners[faces], axis=1)
         return Curve(faces, weights, curve.closed, curve.oriented, curve.normals)
-
-
-def copied_faces(faces: Ints, n_vertices: int) -> Ints:
-    """(m,) first face on the vertices of each face with an edge of more than two faces; elsewhere the face itself.
-
-    For a face that has a vertex twice, and so no area, it is one with the same vertices, if there is one.
-    """
-    first = np.arange(len(faces))
-    doubled = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
-    crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
-    if len(crowded):
-        copies, _ = coincident_faces(faces[crowded].ravel(), np.arange(0, 3 * len(crowded) + 1, 3))
-        first[crowded] = np.where(copies < 0, crowded, crowded[copies])
-    for face in np.flatnonzero(doubled).tolist():
-        around = np.flatnonzero(np.isin(faces, faces[face]).sum(axis=1) >= len(set(faces[face].tolist())))
-        others = around[~doubled[around]]
-        first[face] = first[others[0]] if len(others) else face
-    return first

@@ -495,6 +495,10 @@ class PlaceableTriangles(Triangles, Protocol):
     @property
     def intrinsic(self) -> IntrinsicMesh: ...
     @property
+    def first_copies(self) -> Ints: ...
+    @property
+    def once(self) -> PlaceableTriangles: ...
+    @property
     def edge_lengths(self) -> Floats: ...
     @property
     def search_tree(self) -> TriangleTree: ...
@@ -509,7 +513,8 @@ def projected_curve(
         raise SourceError(
             f"a polyline needs at least two points, not {len(points)}", remedy="for isolated points use points_at"
         )
-    faces, weights, distances = closest_points(mesh, points)
+    once = mesh.once  # no path leads from a face to its neighbours' copies
+    faces, weights, distances = closest_points(once, points)
     if max_distance is None:
         max_distance = 0.05 * float(np.linalg.norm(mesh.bounds[1] - mesh.bounds[0]))
     far = int(distances.argmax())
@@ -520,13 +525,13 @@ def projected_curve(
             remedy="check units and placement, or raise max_distance",
             element=f"point {far}",
         )
-    triangles = mesh.intrinsic
+    triangles = once.intrinsic
     start = np.arange(len(points) if closed else len(points) - 1)
     located, starts, ends, _ = join(
         triangles, locate_points(triangles, faces, weights), start, (start + 1) % len(points), "polyline"
     )
     order = starts if closed else np.append(starts, ends[-1])
-    return Curve(located.faces[order], located.barycentric[order], closed=closed, oriented=oriented)
+    return Curve(mesh.first_copies[located.faces[order]], located.barycentric[order], closed, oriented)
 
 
 def closest_points(mesh: PlaceableTriangles, points: Floats) -> tuple[Ints, Floats, Floats]:

@@ -14,7 +14,7 @@ from ..errors import GeometryError, counted
 from ..mesh.edges import EdgeTable, edge_table
 from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
 from ..mesh.triangles import area_vectors
-from ..mesh.welding import ONE_PLACE, SEAM_UNITS, joined_rims
+from ..mesh.welding import ONE_PLACE, SEAM_UNITS, copied_faces, joined_rims
 from ..search.nearest_triangles import TriangleTree
 from ..shapes.exchange import Elements, Exchangeable
 from ..validation import coordinates, element_ids, used_bounds
@@ -189,6 +189,17 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         """The same faces, with one vertex for boundary vertices at the same place."""
         whole = (self.places == np.arange(self.n_vertices)).all()
         return self if whole else TriangleMesh(self.vertices, self.places[self.faces])
+
+    @cached_property
+    def first_copies(self) -> Ints:
+        """(k,) the faces that are no copies of earlier ones, however these are turned."""
+        return np.unique(copied_faces(self.faces, self.n_vertices))
+
+    @cached_property
+    def once(self) -> TriangleMesh:
+        """The mesh with those faces alone."""
+        kept = self.first_copies
+        return self if len(kept) == self.n_faces else TriangleMesh(self.vertices, self.faces[kept])
 
     @cached_property
     def search_tree(self) -> TriangleTree:
