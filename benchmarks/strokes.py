@@ -3,9 +3,9 @@
 Closed curves on random surfaces are damaged in each of the ways of `shapes.strokes`, and `sh.signed_distance` of what
 is left is compared with the sides that were meant. Of every seed and damage there is one case; it is wrong if more than
 6 % of the area, farther than two edges from the curves, has the wrong sign. Seeds from 1000 on are not used to choose
-numbers of the package. A right answer is warned of in need, which is counted by itself, where more than a quarter of the
-length was left out, all of it in strokes that lead farther than an edge away from the curves, or where about half of the
-length was turned, so that nothing in the drawing tells which half is right.
+numbers of the package. A warning about a right answer is due, which is counted by itself, where more than a quarter of
+the length was left out, all of it in strokes that lead farther than an edge away from the curves, or where about half
+of the length was turned, so that nothing in the drawing tells which half is right.
 
     python benchmarks/strokes.py [--seeds 1000 1025] [--fine 3] [--processes 2] [--worst 20 --picture worst.png]
 """
