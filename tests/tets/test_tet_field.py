@@ -54,6 +54,16 @@ def test_level_sets_of_anything_are_closed_manifold(ball):
         assert_closed_manifold(sh.Field(mesh, values).contour(0.0))
 
 
+@pytest.mark.parametrize("slope", [(1, -1, 0.1), (-1, 1, 0.1), (0, 0, 1), (1, 1, 1), (-1, -1, -1)])
+def test_level_sets_of_cubes_that_touch_along_an_edge_are_manifold(slope):
+    mesh = boxes((2, 2, 1), 1.0, keep=lambda centres: (centres[:, 0] < 1) == (centres[:, 1] < 1))
+    values = (mesh.vertices - [1.0, 1.0, 0.4]) @ np.array(slope)
+    surface = sh.Field(mesh, values).contour()
+    assert_closed_manifold(surface)
+    other = sh.Field(mesh, -values).contour()
+    assert enclosed_volume(surface) + enclosed_volume(other) == pytest.approx(2.0)
+
+
 def test_level_sets_at_edges_without_faces_between_are_manifold():
     tets = [[0, 1, 2, 3], [0, 1, 4, 5]]
     mesh = sh.TetMesh([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], tets)
