@@ -1,5 +1,7 @@
 """Surfaces of solids: closed, manifold, with sharp edges, and without triangles that pass through each other."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy
@@ -11,7 +13,8 @@ from shapes.grid_cases import assert_closed_manifold
 from signedheat import samples
 from signedheat.errors import InexactWarning, OutsideError
 from signedheat.mesh.self_intersections import self_intersections
-from signedheat.solids import contouring, simplification
+from signedheat.solids import contouring, kept_faces, simplification
+from signedheat.solids.bodies import crossing_faces
 from signedheat.solids.completion import complete
 from signedheat.solids.contouring import sharp_surface
 from signedheat.solids.offsets import Offset
@@ -259,6 +262,20 @@ def test_whole_shapes_keep_their_faces_as_they_are():
     surface = complete(torus).surface()
     given, kept = (np.sort(each.vertices[each.faces].reshape(-1, 9), axis=0) for each in (torus, surface))
     np.testing.assert_array_equal(kept, given)
+
+
+@pytest.mark.parametrize("apart", [3.0, 1.0])
+def test_crossings_are_not_looked_for_twice(apart, monkeypatch):
+    """Where completing found none, the surface is the same as where it looks again; what was cut is looked at."""
+    solid = sh.complete([samples.sphere(2), samples.sphere(2, center=(apart, 0.1, 0.2))])
+    assert solid.uncrossed == (apart > 2) and not sh.transform(solid, np.eye(4)).uncrossed
+    again = replace(solid, uncrossed=False).surface()
+    searched = []
+    monkeypatch.setattr(kept_faces, "crossing_faces", lambda *given: searched.append(1) or crossing_faces(*given))
+    made = solid.surface()
+    assert len(searched) == (apart < 2)
+    np.testing.assert_array_equal(made.vertices, again.vertices)
+    np.testing.assert_array_equal(made.faces, again.faces)
 
 
 def test_a_level_or_a_grid_asks_for_a_contour_and_nothing_else_does():

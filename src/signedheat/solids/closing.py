@@ -383,12 +383,14 @@ class _Surface(Frozen):
 def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints = NO_EDGES) -> Ints:
     """Fill small holes if lids are `bent`, and gaps without area, by (k, 3) triangles between their vertices."""
     surface = _Surface(vertices, faces, outlines)
+    if not surface.loops:
+        return np.empty((0, 3), dtype=np.int64)
     triangles, chosen, corners, normals = [np.empty((0, 3), dtype=np.int64)], [], [], []
     starts = np.cumsum([0, *map(len, surface.loops)])
     tails, following = np.concatenate([*surface.loops, starts[:0]]), next_in_groups(starts)
     of_loops = turning(surface.vertices[tails], following), surface.behind(tails, tails[following])[0]
     turns, behind = (np.split(values, starts[1:-1]) for values in of_loops)
-    for loop, turn, near in zip(surface.loops, turns, behind, strict=False):  # np.split makes one part of nothing
+    for loop, turn, near in zip(surface.loops, turns, behind, strict=True):
         places = np.flatnonzero(turn)
         if len(places) < 3:
             triangles.append(fan(loop))

@@ -332,6 +332,7 @@ def _with_whole_boundary(solid: Solid, mesh: TriangleMesh) -> Solid:
         confidence=np.concatenate([confidence, solid.confidence[rest]]),
         bounding=np.append(np.ones(len(made), dtype=bool), np.zeros(int(rest.sum()), dtype=bool)),
         windings=Windings(made),
+        uncrossed=False,
     )
 
 

@@ -50,10 +50,12 @@ class Joined:
     open: bool  # whether any edges are unbalanced
 
     @classmethod
-    def of(cls, points: Floats, faces: Ints) -> Joined:
-        """Find where triangles do not close or pass through each other."""
+    def of(cls, points: Floats, faces: Ints, uncrossed: bool = False) -> Joined:
+        """Find where triangles do not close or, unless they are `uncrossed`, pass through each other."""
         table = edge_table(faces)
         gaps = table.vertices[table.balance != 0]
+        if uncrossed:
+            return cls(points, faces, gaps, bool(len(gaps)))
         depths = TOLERANCES[-1] * tolerances(points, faces, SAME_POINT)  # merging leaves crossings as deep as this
         meeting = faces[np.unique(crossing_faces(points, faces, depths))]
         return cls(points, faces, np.concatenate([gaps, meeting[:, :2], meeting[:, 1:]]), bool(len(gaps)))
@@ -81,7 +83,7 @@ def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurf
         raise GeometryError(
             "nothing of the shape bounds a solid", remedy="thicken it, or take the surface at a distance above zero"
         )
-    whole = Joined.of(*indexed(bounding))
+    whole = Joined.of(*indexed(bounding), solid.uncrossed)
     if len(whole.bad):
         proven = whole_boundary(bounding, windings)
         whole = whole if proven is None else Joined.of(*indexed(proven))

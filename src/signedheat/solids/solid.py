@@ -88,6 +88,8 @@ class Solid(Displayed, Represented, Frozen):
         Triangles of the input, which barycentric coordinates refer to.
     diagnostics : Diagnostics
         Notes on faces that were flipped, left out and added.
+    uncrossed : bool
+        Whether the triangles are known not to cross each other, so that nobody need look again.
 
     See Also
     --------
@@ -116,6 +118,7 @@ class Solid(Displayed, Represented, Frozen):
     windings: Windings
     source: TriangleMesh | None = None
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
+    uncrossed: bool = False
 
     @cached_property
     def features(self) -> FaceFeatures:
@@ -784,4 +787,11 @@ def _(shape: Solid, linear: Floats, move: Floats) -> Solid:
     source = None if shape.source is None else cast("TriangleMesh", transformed(shape.source, linear, move))
     notes = still_true(shape.diagnostics.notes, triangles, shape.origins < 0)
     diagnostics = replace(shape.diagnostics, notes=notes)
-    return replace(shape, triangles=triangles, windings=Windings(closing), source=source, diagnostics=diagnostics)
+    return replace(
+        shape,
+        triangles=triangles,
+        windings=Windings(closing),
+        source=source,
+        diagnostics=diagnostics,
+        uncrossed=False,
+    )

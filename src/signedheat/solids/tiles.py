@@ -74,6 +74,8 @@ class Evaluated(SolidQueries, Protocol):
     def windings(self) -> Windings: ...  # winding numbers, which decide what is inside
     @property
     def diagnostics(self) -> Diagnostics: ...  # notes on faces that were flipped, left out and added
+    @property
+    def uncrossed(self) -> bool: ...  # whether the triangles are known not to cross
 
 
 def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Field[Grid[Literal[3]]]:

@@ -81,7 +81,8 @@ def united(
     if not (uncut and bounding.all()):
         windings = _windings_of(triangles[bounding], windings)
     triangles = triangles if kept.all() else triangles[kept]
-    return Solid(triangles, origins[kept], confidence, bounding[kept], windings, None, diagnostics)
+    uncrossed = uncut and pieces.points is places  # no two of them met
+    return Solid(triangles, origins[kept], confidence, bounding[kept], windings, None, diagnostics, uncrossed)
 
 
 def _windings_of(triangles: Floats, given: Windings) -> Windings:
