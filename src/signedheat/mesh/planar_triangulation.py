@@ -487,7 +487,7 @@ def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: in
     x, tri, adj, fixed, flat = mesh.x, mesh.tri, mesh.adj, mesh.fixed, mesh.flat
     tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]
     while True:  # edges across the segment: tails on its right, heads on its left
-        if adj[t, k] < 0:
+        if adj[t, k] < 0 or len(tails) > 3 * mesh.room[1]:  # through flat triangles it may go round and round
             return -1
         if fixed[t, k]:
             return a if _cross(mesh, t, k, a, b) else -1
