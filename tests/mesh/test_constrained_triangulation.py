@@ -1,14 +1,16 @@
-"""Segments in a triangle become ways along edges, however near to each other the points lie and where they cross."""
+"""Segments in a triangle become ways along edges, however near their points lie and where they cross; polygons."""
 
 from __future__ import annotations
 
 from itertools import pairwise
+from time import perf_counter
 
 import numpy as np
 import pytest
 
 from signedheat.mesh.conforming_refinement import with_middles
-from signedheat.mesh.planar_triangulation import triangulate_crossing
+from signedheat.mesh.edges import edge_table
+from signedheat.mesh.planar_triangulation import triangulate_crossing, triangulate_polygon
 from signedheat.mesh.surface_points import ZERO_COORDINATE
 
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -75,3 +77,65 @@ def test_a_curve_of_many_segments_takes_time_in_proportion():
     spiral = 0.3 + (0.002 * angles / np.pi / 2 * np.stack([np.cos(angles), np.sin(angles)])).T
     points = np.concatenate([CORNERS, spiral])
     check(points, [1, 2, 3], list(pairwise(range(3, len(points)))), 1e-9)
+
+
+TURNS = 2 * np.pi * np.arange(120) / 120
+ROUND = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
+ROW = np.linspace(0, 1, 40)
+POLYGONS = {
+    "circle": ROUND,
+    "star": ROUND * (1 + 0.6 * np.cos(7 * TURNS))[:, None],
+    "comb": np.concatenate([np.stack([ROW, 0 * ROW], 1), np.stack([ROW[::-1], 0.1 + np.arange(40) % 2], 1)]),
+    "spiral": np.concatenate([ROUND * (2 + TURNS / 7)[:, None], ROUND[::-1] * (1.98 + TURNS[::-1] / 7)[:, None]]),
+}
+
+
+def turns(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Twice the signed areas of triangles."""
+    return (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+
+
+@pytest.mark.parametrize("within", [0, 60])
+@pytest.mark.parametrize("shape", POLYGONS)
+def test_polygons_are_filled_by_their_constrained_delaunay_triangles(shape, within):
+    loop = POLYGONS[shape]
+    n = len(loop)
+    inner = np.random.default_rng(3).uniform(loop.min(axis=0), loop.max(axis=0), (within, 2))
+    points = np.concatenate([loop, inner])
+    faces = triangulate_polygon(points, n)
+    used = np.unique(faces[faces >= n])
+    assert len(faces) == n - 2 + 2 * len(used)
+    a, b, c = points[faces].swapaxes(0, 1)
+    assert turns(a, b, c).min() > 0
+    assert turns(a, b, c).sum() == pytest.approx(turns(0 * loop, loop, np.roll(loop, -1, axis=0)).sum(), rel=1e-12)
+    table = edge_table(faces)
+    rims = {(k, (k + 1) % n) for k in range(n)}
+    assert set(map(tuple, table.vertices[table.face_counts == 1].tolist())) == rims
+    first, second = table.pairs.T  # opposite angles of other edges sum to half a turn at most
+    opposite = [np.roll(faces, 1, axis=1).ravel()[halfedges] for halfedges in (first, second)]
+    tails, heads = points[faces.ravel()[first]], points[np.roll(faces, -1, axis=1).ravel()[first]]
+    sums = 0.0
+    for apex in opposite:
+        (x, y), (u, v) = (tails - points[apex]).T, (heads - points[apex]).T
+        sums = sums + np.abs(np.arctan2(x * v - y * u, x * u + y * v))
+    assert sums.max() < np.pi + 1e-6
+
+
+def test_polygons_that_cross_or_touch_themselves_are_refused():
+    eight = np.stack([np.sin(TURNS + 0.01), np.sin(2 * TURNS + 0.02)], axis=1)
+    square = np.array([[0.0, 0.0], [1, 0], [1, 1], [0, 1]])
+    assert triangulate_polygon(eight, 120) is None
+    assert triangulate_polygon(square[::-1], 4) is None  # clockwise
+    touching = np.array([[0.0, 0.0], [1, 0], [1, 1], [0.5, 0.0], [0, 1]])
+    assert triangulate_polygon(touching, 5) is None
+    touching[3, 1] = 1e-9
+    assert len(triangulate_polygon(touching, 5)) == 3
+
+
+def test_rows_of_points_take_time_in_proportion():
+    """Inserted in order, each point of one side would change the edges to all points of the other."""
+    row = np.linspace(0, 1, 50_000)
+    ladder = np.concatenate([np.stack([row, 0 * row], axis=1), np.stack([row[::-1], 0 * row + 1], axis=1)])
+    began = perf_counter()
+    assert len(triangulate_polygon(ladder, len(ladder))) == len(ladder) - 2
+    assert perf_counter() - began < 20  # half a second; in order, minutes

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
+from .components import connected_components
 
 FLAT_HEIGHT = 1e-13
 """Height of a triangle, relative to the size of the face, below which it is flat."""
@@ -114,9 +115,42 @@ def triangulate_crossing(
             ways.append(goal)
             a = goal
         starts[s + 1] = len(ways)
+    _improve(mesh)
     total, last = mesh.room
     across = np.where(mesh.fixed, -1, mesh.adj)
     return mesh.x[:total], mesh.parents[n:total], mesh.tri[:last], across[:last], np.array(ways), starts
+
+
+AROUND = np.array([[-3.0, -2.0], [3.0, -2.0], [0.0, 3.0]])
+"""Corners of a triangle around points, relative to their size."""
+
+
+def triangulate_polygon(points: Floats, n: int) -> Ints | None:
+    """Return the (k, 3) constrained Delaunay triangles of a counter-clockwise polygon through the first n points.
+
+    Of the other points, those within are used, too. None if the polygon crosses or touches itself, or runs clockwise.
+    """
+    lower, upper = points.min(axis=0), points.max(axis=0)
+    size = float((upper - lower).max())
+    around = 0.5 * (lower + upper) + size * AROUND
+    # in rounds of about twice as many points each, so that rows of points take no time that is quadratic
+    order = np.argsort(-np.random.default_rng(0).geometric(0.5, len(points)), kind="stable")
+    place = np.argsort(order)
+    sides = 3 + np.stack([place[:n], np.roll(place[:n], -1)], axis=1)
+    _, added, triangles, across, chains, _ = triangulate_crossing(
+        np.concatenate([around, points[order]]), np.array([1, 2, 3]), sides, FLAT_HEIGHT * size
+    )
+    if len(added) or len(chains) != 2 * n or (chains[1::2] != sides[:, 1]).any():
+        return None
+    rows, beyond = np.nonzero(across >= 0)
+    regions = connected_components(len(triangles), rows, across[rows, beyond])
+    tails = np.append([-1, -2, -3], order)[triangles]
+    heads = np.roll(tails, -1, axis=1)
+    forth = (tails >= 0) & (tails < n) & (heads == (tails + 1) % n)
+    back = (heads >= 0) & (heads < n) & (tails == (heads + 1) % n)
+    left, right = (np.unique(regions[on.any(axis=1)]) for on in (forth, back))
+    faces = tails[np.isin(regions, left)]
+    return None if int(forth.sum()) != n or np.isin(left, right).any() or faces.min() < 0 else faces
 
 
 @compiled

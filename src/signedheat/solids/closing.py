@@ -270,7 +270,7 @@ def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Int
 
     Small holes are filled by triangles between their corners, and rims that run along each other are joined by strips.
     Other loops get lids: `bent` ones, flat faces that meet in creases, or films. Loops that consist of `outlines`,
-    (k, 2) edges, stay open. Where a lid is finer than its rim, triangles without area lie between them.
+    (k, 2) edges, stay open.
     """
     faces = np.asarray(faces, dtype=np.int64)
     if len(boundary(faces)) == len(outlines):

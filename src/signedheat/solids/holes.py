@@ -112,8 +112,7 @@ def fill_holes(
     FilledMesh or FilledPolygonMesh
         A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes: ``origins``, (m,) int,
         the number of each face in the given mesh, −1 for new ones; ``filled`` and ``left``, the vertices around each
-        rim that was closed, and around each that is still open. Where a lid is finer than the edges around it,
-        triangles without area lie between.
+        rim that was closed, and around each that is still open.
 
     Raises
     ------

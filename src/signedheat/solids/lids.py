@@ -12,12 +12,13 @@ from scipy import sparse
 
 from ..arrays import Floats, Ints
 from ..mesh.components import numbered, sums_of
+from ..mesh.planar_triangulation import triangulate_polygon
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..parallel import PointTree
 from . import spanning
 from .rims import corners_of
-from .spanning import Frame, Spanned, area_vector, frame_of, points_inside, spanned
+from .spanning import Frame, area_vector, frame_of, points_inside
 
 LOOP_POINTS = 128
 """Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""
@@ -103,20 +104,18 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
     else:
         flat = (rim.points - frame[0]) @ frame[1]
         inner = spanning.points_inside(flat)
-    triangulation = spanning.spanned(flat, inner)
-    if triangulation is None:
+    n, faces = len(flat), triangulate_polygon(np.concatenate([flat, inner]), len(flat))
+    if faces is None:
         return None
-    inner = inner[triangulation.inner]
-    points = triangulation.rim(rim.points)
+    faces, inner = _without_unused(faces, n, inner)
     first = np.zeros((len(inner), 3)) if frame is None else frame[0] + inner @ frame[1].T
-    places = rim.places[triangulation.edges] + triangulation.shares / LOOP_POINTS
-    return Film(
-        np.concatenate([points, first]),
-        triangulation.faces,
-        len(points),
-        np.concatenate([triangulation.rim(flat), inner]),
-        places,
-    )
+    return Film(np.concatenate([rim.points, first]), faces, n, np.concatenate([flat, inner]), rim.places[:-1])
+
+
+def _without_unused(faces: Ints, n: int, inner: Floats) -> tuple[Ints, Floats]:
+    """Return faces and those of the points after the first n that they use."""
+    used = np.unique(faces[faces >= n])
+    return np.where(faces < n, faces, n + np.searchsorted(used, faces)), inner[used - n]
 
 
 EVEN_SHARE = 1e-3
@@ -130,32 +129,36 @@ def _around_disc(shares: Floats) -> Floats:
 
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
     """Span a loop with inner points of another lid: added points, and triangles; None if its image crosses itself."""
-    n, ways = over.n_rim, np.roll(loop, -1, axis=0) - loop
-    edges, shares = cut_to_pieces(loop)
+    n, inner = len(loop), over.plane[over.n_rim :]
+    kept = np.ones(len(inner), dtype=bool)
     if frame is None:
-        even = np.arange(len(edges)) / len(edges)  # keeps points apart where sides are as short as rounding
-        flat = _around_disc((1 - EVEN_SHARE) * (starts[edges] + shares * np.diff(starts)[edges]) + EVEN_SHARE * even)
-        inner = np.arange(n, len(over.plane))
+        even = np.arange(n) / n  # keeps points apart where sides are as short as rounding
+        shares = (1 - EVEN_SHARE) * starts[:-1] + EVEN_SHARE * even
+        flat, inner = _around_disc(shares), _in_polygon(shares, inner)
     else:
+        edges, shares = cut_to_pieces(loop)
+        ways = np.roll(loop, -1, axis=0) - loop
         rim = (loop[edges] + shares[:, None] * ways[edges] - frame[0]) @ frame[1]
-        away = PointTree(rim).query(over.plane[n:])[0]
-        inner = n + np.flatnonzero(away > RIM_CLEARANCE * float(np.linalg.norm(ways, axis=1).sum()) / LOOP_POINTS)
-        edges, shares = np.arange(len(loop)), np.zeros(len(loop))
+        kept = PointTree(rim).query(inner)[0] > RIM_CLEARANCE * float(side_lengths(loop).sum()) / LOOP_POINTS
         flat = (loop - frame[0]) @ frame[1]
-    triangulation = spanning.spanned(flat, over.plane[inner])
-    if triangulation is None:
+    faces = triangulate_polygon(np.concatenate([flat, inner[kept]]), n)
+    if faces is None:
         return None
-    ends = np.append(shares[1:], 0.0)[triangulation.edges]
-    ends[ends == 0] = 1.0
-    begins = shares[triangulation.edges]
-    whole = Spanned(
-        edges[triangulation.edges],
-        begins + triangulation.shares * (ends - begins),
-        triangulation.inner,
-        triangulation.faces,
-    )
-    added = whole.rim(loop)[whole.shares > 0]
-    return np.concatenate([added, over.vertices[inner[whole.inner]]]), whole.balanced()
+    faces, points = _without_unused(faces, n, over.vertices[over.n_rim :][kept])
+    return points, faces
+
+
+def _in_polygon(shares: Floats, points: Floats) -> Floats:
+    """Move (n, 2) points in the unit disc towards its centre, into the polygon with corners at shares of its rim.
+
+    No side of a closed loop is longer than all others, so that the centre lies within.
+    """
+    place = np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi) % 1.0
+    corners = np.append(shares, shares[0] + 1.0)
+    turns = (place - shares[0]) % 1.0 + shares[0]
+    side = np.clip(np.searchsorted(corners, turns, side="right") - 1, 0, len(shares) - 1)
+    half, middle = 0.5 * (corners[side + 1] - corners[side]), 0.5 * (corners[side] + corners[side + 1])
+    return points * (np.cos(2 * np.pi * half) / np.cos(2 * np.pi * (turns - middle)))[:, None]
 
 
 def film(pattern: Film) -> Film:
@@ -312,11 +315,6 @@ def is_flat(points: Floats) -> bool:
     return bool(np.abs(around @ normal).max() <= COPLANAR * np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def flat_lid(loop: Floats) -> tuple[Floats, Ints] | None:
-    """Make the lid of a planar loop, as added points and triangles; None if the loop crosses itself."""
-    return _filled(loop, len(loop), [np.arange(len(loop))])
-
-
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
     """Make the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
 
@@ -426,11 +424,11 @@ def _filled(points: Floats, n_rim: int, polygons: list[Ints]) -> tuple[Floats, I
         plane, inner = (corners - frame[0]) @ frame[1], np.empty((0, 2))
         if len(corners) > FLAT_LID_CORNERS:
             inner = points_inside((SmoothRim.of(corners).points - frame[0]) @ frame[1])
-        lid = spanned(plane, inner)
+        lid = triangulate_polygon(np.concatenate([plane, inner]), len(plane))
         if lid is None:
             return None
-        added = np.concatenate([lid.rim(corners)[lid.shares > 0], frame[0] + inner[lid.inner] @ frame[1].T])
-        vertices.append(added)
-        faces.append(np.concatenate([polygon, count + np.arange(len(added))])[lid.balanced()])
-        count += len(added)
+        lid, inner = _without_unused(lid, len(plane), inner)
+        vertices.append(frame[0] + inner @ frame[1].T)
+        faces.append(np.concatenate([polygon, count + np.arange(len(inner))])[lid])
+        count += len(inner)
     return np.concatenate(vertices)[n_rim:], np.concatenate(faces)

@@ -1,15 +1,10 @@
-"""Triangulate closed loops: in a plane, or in a disc where their projections cross themselves."""
+"""Planes in which closed loops are triangulated, and points within; and a disc where their projections cross."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import scipy
 
-from ..arrays import Bools, Floats, Ints
-from ..mesh.components import connected_components
-from ..mesh.edges import edge_keys, edge_table
+from ..arrays import Bools, Floats
 from ..mesh.triangles import side_lengths
 from ..parallel import PointTree
 
@@ -19,36 +14,6 @@ MOST_TIES = 128
 """Maximum number of equally distant points of a loop that are compared, and number of places compared for each."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
-
-
-@dataclass(frozen=True, eq=False)
-class Spanned:
-    """Triangles in a closed loop in the plane, whose edges were halved until all of them were edges of triangles."""
-
-    # (r,) of each point of the rim, in order: the edge of the loop that it lies on, and the share of its length
-    # before it; 0 at the vertices of the loop
-    edges: Ints
-    shares: Floats
-    inner: Ints  # (k,) which of the points inside are used
-    faces: Ints  # (m, 3) counterclockwise; the points of the rim come first
-
-    def rim(self, loop: Floats) -> Floats:
-        """(r, d) positions of the points of the rim on a loop in any dimension that has as many vertices."""
-        ways = np.roll(loop, -1, axis=0) - loop
-        return loop[self.edges] + self.shares[:, None] * ways[self.edges]
-
-    def balanced(self) -> Ints:
-        """(p, 3) faces whose boundary is the loop, with triangles without area along edges that were halved."""
-        whole = self.shares == 0
-        n, r = int(whole.sum()), len(self.edges)
-        number = np.empty(r + len(self.inner), dtype=np.int64)
-        number[:r][whole] = np.arange(n)
-        number[:r][~whole] = np.arange(n, r)
-        number[r:] = np.arange(r, len(number))
-        added = np.flatnonzero(~whole)
-        onward = np.where(whole[(added + 1) % r], (self.edges[added] + 1) % n, number[(added + 1) % r])
-        fans = np.stack([self.edges[added], onward, number[added]], axis=1)
-        return np.concatenate([number[self.faces], fans])
 
 
 def frame_of(rim: Floats) -> Frame | None:
@@ -90,61 +55,6 @@ def area_vector(loop: Floats) -> Floats:
     """(3,) the area that a closed loop encloses, along its normal."""
     around = loop - loop.mean(axis=0)
     return 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
-
-
-def spanned(loop: Floats, inner: Floats) -> Spanned | None:
-    """Make Delaunay triangles of a polygon in the plane and the `inner` points within it; None if it crosses itself."""
-    count = len(loop)
-    edges, shares = np.arange(count), np.zeros(count)
-    for _ in range(8):  # until all edges of the rim, halved, are edges of the triangulation
-        n = len(edges)
-        rim = loop[edges] + shares[:, None] * (np.roll(loop, -1, axis=0) - loop)[edges]
-        points = np.concatenate([rim, inner])
-        faces = counterclockwise(points)
-        after = (np.arange(n) + 1) % n
-        missing = ~np.isin(edge_keys(np.arange(n), after), edge_keys(faces.ravel(), np.roll(faces, -1, axis=1).ravel()))
-        if not missing.any():
-            kept = _to_the_left(faces, n)
-            if kept is None:
-                return None
-            used = np.unique(kept[kept >= n])
-            number = np.zeros(len(points), dtype=np.int64)
-            number[:n], number[used] = np.arange(n), n + np.arange(len(used))
-            return Spanned(edges, shares, used - n, number[kept])
-        split = np.flatnonzero(missing)
-        ends = np.where(shares[after[split]] == 0, 1.0, shares[after[split]])
-        middles = 0.5 * (shares[split] + ends)
-        edges, shares = np.insert(edges, split + 1, edges[split]), np.insert(shares, split + 1, middles)
-    return None
-
-
-def _to_the_left(faces: Ints, n: int) -> Ints | None:
-    """Return the triangles to the left of the loop through points 0 to n − 1; None if it crosses itself."""
-    table = edge_table(faces)
-    tails, heads = table.vertices.T
-    with_loop = (tails < n) & (heads == (tails + 1) % n)
-    on_loop = with_loop | ((heads < n) & (tails == (heads + 1) % n))
-    inner_pairs = table.pairs[~on_loop[table.face_edges.ravel()[table.pairs[:, 0]]]]
-    regions = connected_components(len(faces), *inner_pairs.T // 3)
-    at_loop = on_loop[table.face_edges]
-    on_left = at_loop & (with_loop[table.face_edges] == table.forward)  # faces are left of the edges they run along
-    left, right = regions[on_left.any(axis=1)], regions[(at_loop & ~on_left).any(axis=1)]
-    if int(on_left.sum()) != n or np.isin(left, right).any():
-        return None
-    return faces[np.isin(regions, left)]
-
-
-def counterclockwise(points: Floats) -> Ints:
-    """Delaunay triangles of points in the plane, moved a little so that rounding does not choose among equal ones."""
-    numbers = np.arange(len(points))[:, None]
-    moves = (numbers * 0.5 * (5**0.5 - 1) * np.array([1.0, 2**0.5])) % 1.0 - 0.5
-    size = float(np.ptp(points, axis=0).max())
-    moved = points + 1e-9 * size * moves  # to choose among equal triangles; rounding is 1e-15
-    faces = scipy.spatial.Delaunay(moved).simplices.astype(np.int64)
-    a, b, c = moved[faces].transpose(1, 0, 2)
-    clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
-    faces[clockwise] = faces[clockwise][:, ::-1]
-    return faces
 
 
 def points_inside(polygon: Floats) -> Floats:
