@@ -1,11 +1,12 @@
 """Polygon meshes: virtual refinement, and distance on it."""
 
+from time import perf_counter
+
 import numpy as np
 import pytest
 
 import signedheat as sh
 from shapes import domain_cases as cases
-from signedheat.mesh.triangles import cut_into_ears
 from signedheat.surfaces.polygon_mesh import virtual_refinement, virtual_vertices
 
 
@@ -55,7 +56,20 @@ def test_polygons_far_from_convex_are_covered_once(turns):
     assert mesh.face_areas.sum() == pytest.approx(8, rel=1e-12)
     normal = mesh.face_area_vectors.sum(axis=0)
     assert (mesh.face_area_vectors @ normal > 0).all()
-    assert len(cut_into_ears(corners, normal)) == 6
+    assert mesh.n_faces == 6 and mesh.n_vertices == 8  # diagonals only
+
+
+def test_a_polygon_of_thousands_of_corners_is_cut_at_once():
+    """A comb, around which no fan fits."""
+    teeth = np.arange(3000)
+    comb = np.concatenate([np.stack([teeth, 0 * teeth], axis=1), np.stack([teeth, 1 + 50 * (teeth % 2)], axis=1)[::-1]])
+    began = perf_counter()
+    _, mesh = refined(np.pad(comb, ((0, 0), (0, 1))).astype(float), [np.arange(6000)])
+    assert perf_counter() - began < 20  # a tenth of a second; ear by ear, many minutes
+    x, y = comb.T.astype(float)
+    assert mesh.n_faces == 5998 and mesh.face_areas.sum() == pytest.approx(
+        0.5 * (x @ np.roll(y, -1) - np.roll(x, -1) @ y)
+    )
 
 
 def test_a_polygon_that_crosses_itself_is_still_covered():

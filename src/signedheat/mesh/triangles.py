@@ -1,4 +1,4 @@
-"""Triangles and polygons in space: areas, volumes, gradients, division, triangulation by cutting off ears; edge flips.
+"""Triangles and polygons in space: areas, volumes, gradients, division; edge flips.
 
 Marching from cell to cell cuts across the creases of a level set and leaves teeth there, although every vertex lies on
 the level. Of the two triangulations of a quadrilateral the one that bends less, ``Σ length · angle`` over its five
@@ -7,7 +7,6 @@ edges, has its diagonal along the crease.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import reduce
 from typing import Protocol
 
@@ -135,49 +134,6 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
         degenerate[f] |= areas[f] <= 4.0 * 2.0**-52 * radius * largest  # 4 units in the last place
     return areas, degenerate
-
-
-def cut_into_ears(polygon: Floats, normal: Floats, allowed: Callable[[int, int], bool] | None = None) -> Ints:
-    """Return (k − 2, 3) ears of a polygon, counter-clockwise around a normal, best first, or (0, 3).
-
-    The polygon is simple, or passes an edge there and back, as round a hole that a cut joins to its outline.
-    """
-    upright = np.eye(3)[np.abs(normal).argmin()]
-    first = np.cross(upright, normal)
-    second = np.cross(normal, first)
-    sizes = np.linalg.norm(first), np.linalg.norm(second)
-    if not min(sizes) > 0:
-        return np.empty((0, 3), dtype=np.int64)
-    plane = polygon @ first / sizes[0] + 1j * (polygon @ second / sizes[1])
-    left = np.arange(len(polygon))
-    triangles = []
-    while len(left) > 3:
-        before, after = np.roll(left, 1), np.roll(left, -1)
-        a, b, c = plane[before], plane[left], plane[after]
-        area = (np.conj(b - a) * (c - a)).imag
-        size = np.abs(b - a) ** 2 + np.abs(c - b) ** 2 + np.abs(a - c) ** 2
-        z = plane[left][:, None]
-        inside = np.ones((len(left), len(left)), dtype=bool)  # [point, ear]
-        for u, v in ((a, b), (b, c), (c, a)):
-            inside &= (np.conj(v - u) * (z - u)).imag >= 0
-        others = (left[:, None] != before) & (left[:, None] != left) & (left[:, None] != after)
-        inside &= others & (z != a) & (z != b) & (z != c)
-        if len(np.unique(plane[left])) < len(left):
-            for u, v, w in ((a, b, c), (b, c, a), (c, a, b)):  # what begins at another corner in the same place as v
-                for step in (plane[after][:, None] - z, plane[before][:, None] - z):
-                    least = AREA_ROUNDING * np.abs(step)
-                    goes_in = (np.conj(w - v) * step).imag > least * np.abs(w - v)
-                    goes_in &= (np.conj(step) * (u - v)).imag > least * np.abs(u - v)
-                    inside |= others & (z == v) & goes_in
-        quality = np.where(inside.any(axis=0), -1.0, area / np.where(size > 0, size, 1.0))
-        ears = np.argsort(-quality, kind="stable")
-        fitting = (k for k in ears[quality[ears] > 0] if allowed is None or allowed(int(before[k]), int(after[k])))
-        ear = next(fitting, None)
-        if ear is None:
-            return np.empty((0, 3), dtype=np.int64)
-        triangles.append([before[ear], left[ear], after[ear]])
-        left = np.delete(left, ear)
-    return np.array([*triangles, left])
 
 
 AREA_ROUNDING = 1e-9

@@ -25,9 +25,9 @@ from ..arrays import Bools, Floats, Ints, mask_of
 from ..compiled import compiled
 from ..mesh.components import connected_components, grouped, members_of
 from ..mesh.edges import edge_table
+from ..mesh.planar_triangulation import triangulate_polygon
 from ..mesh.signed_graph import Links, signs_of
-from ..mesh.triangles import cut_into_ears
-from ..mesh.unit_vectors import unit
+from ..mesh.unit_vectors import axes_across, unit
 from ..mesh.welding import distinct_rows
 from ..parallel import PointTree, in_chunks
 from ..search.nearest_triangles import TriangleTree
@@ -445,13 +445,13 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
     following = next_around_gap(points, normals, tails, heads)
     at_boundary = mask_of(len(points), tails)
     existing = {_pair(i, j) for i, j in edges.vertices[at_boundary[edges.vertices].all(axis=1)].tolist()}
-    fillings: list[tuple[int, int, int]] = []
+    fillings: list[list[int]] = []
     passed = np.zeros(len(tails), dtype=bool)
     for start in range(len(tails)):
         if not passed[start]:
             clockwise = _loop_from(start, following)  # faces are left of their edges, and the hole is to the right
             passed[clockwise] = True
-            fillings += _ears(points, normals, tails[clockwise[::-1]].tolist(), existing)
+            fillings += _filling(points, normals, tails[clockwise[::-1]].tolist(), existing)
     return np.array(fillings, dtype=np.int64).reshape(-1, 3)
 
 
@@ -482,9 +482,7 @@ def _loop_from(start: int, following: Ints) -> list[int]:
     return []
 
 
-def _ears(
-    points: Floats, normals: Floats, loop: list[int], existing: set[tuple[int, int]]
-) -> list[tuple[int, int, int]]:
+def _filling(points: Floats, normals: Floats, loop: list[int], existing: set[tuple[int, int]]) -> list[list[int]]:
     """Triangles that fill a loop of vertices, counter-clockwise around a hole; their edges are added to `existing`."""
     if len(set(loop)) < max(len(loop), 3):
         return []
@@ -493,9 +491,17 @@ def _ears(
     fan = np.cross(corners - corners[0], np.roll(corners, -1, axis=0) - corners[0]).sum(axis=0)
     if fan @ normal <= 0:
         return []
-    ears = cut_into_ears(corners, normal, lambda i, k: _pair(loop[i], loop[k]) not in existing)
-    existing |= {_pair(loop[i], loop[k]) for i, _, k in ears[:-1]}
-    return [(loop[i], loop[j], loop[k]) for i, j, k in ears]
+    axes = np.concatenate(axes_across(normal[None]))
+    made = triangulate_polygon((corners - corners[0]) @ axes.T, len(loop))
+    if made is None:
+        return []
+    triangles: list[list[int]] = np.array(loop)[made].tolist()
+    sides = {_pair(loop[k - 1], loop[k]) for k in range(len(loop))}
+    diagonals = {_pair(row[k - 1], row[k]) for row in triangles for k in range(3)} - sides
+    if diagonals & existing:
+        return []
+    existing |= diagonals
+    return triangles
 
 
 def _pair(i: int, j: int) -> tuple[int, int]:

@@ -20,7 +20,9 @@ from scipy import sparse
 from ..arrays import Bools, Floats, Ints, mask_of
 from ..errors import GeometryError, counted
 from ..mesh.components import next_in_groups, sums_of
-from ..mesh.triangles import area_vectors, cut_into_ears
+from ..mesh.planar_triangulation import triangulate_polygon
+from ..mesh.triangles import area_vectors
+from ..mesh.unit_vectors import axes_across
 from ..shapes.exchange import Elements, Exchangeable
 from ..validation import array_of, coordinates, from_zero, frozen, used_bounds, whole_numbers
 from .surface import Surface, check_mask
@@ -185,6 +187,8 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         return f"PolygonMesh({counted(self.n_vertices, 'vertex')}, {counted(self.n_polygons, 'polygon')})"
 
 
+TWICE_APART = 1e-9
+"""Corners that a polygon passes twice are moved inwards, relative to its size, while diagonals are found."""
 _SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
 
 
@@ -272,10 +276,19 @@ def virtual_vertices(
 
 
 def _cut(polygon: Floats) -> Ints:
-    """(k − 2, 3) triangles into which diagonals cut a polygon."""
-    center = np.broadcast_to(polygon.mean(axis=0), polygon.shape)
-    normal = area_vectors(np.stack([polygon, np.roll(polygon, -1, axis=0), center], axis=1)).sum(axis=0)
-    return np.sort(cut_into_ears(polygon, normal), axis=1)
+    """(k − 2, 3) triangles into which diagonals cut a polygon, which may pass an edge there and back; or (0, 3)."""
+    around = polygon - polygon.mean(axis=0)
+    normal = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
+    if not normal.any():
+        return np.empty((0, 3), dtype=np.int64)
+    plane = (around @ np.concatenate(axes_across(normal[None])).T) @ [1, 1j]
+    _, place, copies = np.unique(plane, return_inverse=True, return_counts=True)
+    twice, ways = copies[place] > 1, np.roll(plane, -1) - plane
+    ways /= np.maximum(np.abs(ways), 1e-300)
+    inwards = 1j * (ways + np.roll(ways, 1))[twice]  # along bisectors
+    plane[twice] += TWICE_APART * np.abs(plane).max() * inwards / np.maximum(np.abs(inwards), 1e-300)
+    triangles = triangulate_polygon(np.stack([plane.real, plane.imag], axis=1), len(plane))
+    return np.empty((0, 3), dtype=np.int64) if triangles is None else np.sort(triangles, axis=1)
 
 
 def _solve_symmetric(matrices: Floats, loads: Floats) -> Floats:
