@@ -34,6 +34,7 @@ from ..mesh.triangles import area_vectors, face_areas, halved, side_lengths
 from ..mesh.unit_vectors import unit
 from ..parallel import PointTree, in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
+from ..surfaces.plane_fits import point_spacing
 
 WEIGHT_DAMPING = 0.01
 """λ: keeps weights small where no level is asked for."""
@@ -386,10 +387,9 @@ def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> 
 
 
 def spacing(places: Floats) -> Floats:
-    """(n,) mean distance of each place to its four nearest neighbours."""
+    """(n,) spacing around each place, from its fourth neighbour."""
     k = min(4, len(places) - 1)
-    distances = PointTree(places).query(places, k + 1)[0].reshape(len(places), -1)
-    return np.asarray(distances[:, 1:].mean(axis=1)) if k else np.ones(len(places))
+    return point_spacing(PointTree(places).query(places, [k + 1])[0][:, 0], k) if k else np.ones(len(places))
 
 
 @compiled
