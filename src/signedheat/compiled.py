@@ -173,8 +173,8 @@ def kept_as(function: Callable[..., Any], name: str) -> Iterator[None]:
 
 
 def has_code(name: str) -> bool:
-    """Tell whether code is kept by a name."""
-    return any(any((root / name).glob("*.nbi")) for root in _roots(name))
+    """Tell whether code of this processor is kept by a name."""
+    return any(any((root / name / _processor()).glob("*.nbi")) for root in _roots(name))
 
 
 class KernelLocator:
@@ -189,7 +189,7 @@ class KernelLocator:
         """Return a locator, or None if no folder can be written to."""
         name = _names[function]
         for root in _roots(name):
-            locator = cls(root / name, file)
+            locator = cls(root / name / _processor(), file)
             try:
                 locator.ensure_cache_path()
             except OSError:
@@ -210,7 +210,7 @@ class KernelLocator:
 
     def get_source_stamp(self) -> str:
         """Return what the code is made of."""
-        return self._folder.name
+        return self._folder.parent.name
 
     def get_disambiguator(self) -> str:
         """Return nothing: each function has a folder of its own."""
@@ -236,6 +236,14 @@ def _folder_of_this_process() -> tempfile.TemporaryDirectory[str]:
 
 
 @cache
+def _processor() -> str:
+    """Return a name for the code of this processor, or of that which Numba's settings ask for."""
+    config, host = numba.config, (llvmlite.get_host_cpu_name(), llvmlite.get_host_cpu_features().flatten())
+    code = *host, config.CPU_NAME, config.CPU_FEATURES, config.ENABLE_AVX
+    return hashlib.sha256(repr(code).encode()).hexdigest()[:8]
+
+
+@cache
 def _kind_of_code() -> tuple[str, str, str] | None:
     """Return how Numba describes code of this processor, or None where `BASELINE` does not run or is not wanted."""
     config = numba.config
@@ -256,12 +264,12 @@ def _unpack(carried: Path, folder: Path) -> None:
     if kind is None:
         return
     try:
-        for path in carried.glob("*.nbi"):
+        for path in carried.glob("*/*.nbi"):
             with path.open("rb") as index:
                 version, (stamp, files) = pickle.load(index), pickle.load(index)
             files = {(types, kind, code): file for (types, made, code), file in files.items() if made[0] == kind[0]}
             for file in files.values():
-                _replace(folder / file, (carried / file).read_bytes())
+                _replace(folder / file, (path.parent / file).read_bytes())
             _replace(folder / path.name, pickle.dumps(version) + numba_serialize.dumps((stamp, files)))
     except Exception as error:  # a damaged file raises errors of many types
         logger.info("the kernels of the wheel are not used: %s", error)
