@@ -637,21 +637,10 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     room = complete(wall, as_oriented=True).distance(np.column_stack([bottom[:, :2], np.full(len(bottom), low + lift)]))
     x, y = bottom[np.argmax(np.round(room / cell, 6)), :2]  # the first of equally wide places
     angles = 2 * np.pi * np.arange(DRAIN_SIDES) / DRAIN_SIDES
-    rim = np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)])
-    ends = wall.bounds[0, 2] - diameter, low + lift
-    vertices = np.concatenate(
-        [*(np.column_stack([rim, np.full(DRAIN_SIDES, z)]) for z in ends), [[x, y, z] for z in ends]]
-    )
-    a, b = np.arange(DRAIN_SIDES), np.roll(np.arange(DRAIN_SIDES), -1)
-    below, above = np.full(DRAIN_SIDES, 2 * DRAIN_SIDES), np.full(DRAIN_SIDES, 2 * DRAIN_SIDES + 1)
-    sides = (
-        (a, b, below),
-        (b + DRAIN_SIDES, a + DRAIN_SIDES, above),
-        (b, a, b + DRAIN_SIDES),
-        (a, a + DRAIN_SIDES, b + DRAIN_SIDES),
-    )  # facing inwards
-    faces = np.concatenate([np.stack(each, axis=1) for each in sides])
-    both = concatenated([(wall.vertices, wall.faces), (vertices, faces)])
+    rim = Polyline(np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)]), closed=True)
+    foot = wall.bounds[0, 2] - diameter
+    prism = extrude(rim, low + lift - foot)
+    both = concatenated([(wall.vertices, wall.faces), (prism.vertices + [0.0, 0.0, foot], prism.faces[:, ::-1])])
     solid = complete(TriangleMesh(*both), as_oriented=True)
     return solid.surface()
 
