@@ -640,7 +640,9 @@ def _drained(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     rim = Polyline(np.column_stack([x + radius * np.cos(angles), y + radius * np.sin(angles)]), closed=True)
     foot = wall.bounds[0, 2] - diameter
     prism = extrude(rim, low + lift - foot)
-    both = concatenated([(wall.vertices, wall.faces), (prism.vertices + [0.0, 0.0, foot], prism.faces[:, ::-1])])
+    both = concatenated(
+        [(wall.vertices, wall.faces), (prism.vertices + np.array([0.0, 0.0, foot]), prism.faces[:, ::-1])]
+    )
     solid = complete(TriangleMesh(*both), as_oriented=True)
     return solid.surface()
 

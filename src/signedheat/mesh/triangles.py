@@ -1,4 +1,4 @@
-"""Triangles and polygons in space: areas, volumes, gradients, division; edge flips.
+"""Triangles in space: areas, volumes, gradients, division; edge flips.
 
 Marching from cell to cell cuts across the creases of a level set and leaves teeth there, although every vertex lies on
 the level. Of the two triangulations of a quadrilateral the one that bends less, ``Σ length · angle`` over its five
@@ -7,6 +7,7 @@ edges, has its diagonal along the crease.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import reduce
 from typing import Protocol
 
@@ -97,6 +98,18 @@ def halved(triangles: Floats) -> Floats:
     a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).swapaxes(0, 1)
     middle = 0.5 * (a + b)
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def cut_small(triangles: Floats, small: Callable[[Floats], Bools]) -> tuple[Floats, Ints]:
+    """Halve (m, 3, 3) triangles until all parts are small; return these, part by part of each, and their originals."""
+    owners, kept, whose = np.arange(len(triangles)), [triangles[:0]], [np.arange(0)]
+    while len(triangles):
+        done = small(triangles)
+        kept.append(triangles[done])
+        whose.append(owners[done])
+        triangles, owners = halved(triangles[~done]), np.tile(owners[~done], 2)
+    order = np.argsort(np.concatenate(whose), kind="stable")
+    return np.concatenate(kept)[order], np.concatenate(whose)[order]
 
 
 def gradients_along(sides: Floats, rises: Floats) -> Floats:

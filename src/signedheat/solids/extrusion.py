@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import GeometryError
 from ..grids.polyline import Polyline
-from ..mesh.edges import edge_table, orient_faces
+from ..mesh.edges import edge_table
 from ..mesh.polylines import filled_outlines
 from ..mesh.triangles import face_areas, part_volumes
 from ..packages import lazy_module
@@ -19,6 +19,7 @@ from ..shapes.transforms import joined_shape
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import finite_number, public_call
+from .mesh_orientation import agreeing_faces
 from .rims import boundary
 
 manifold3d: Any = lazy_module("manifold3d", "triangles of outlines")
@@ -112,5 +113,4 @@ def _sheet(shape: Any, height: float) -> tuple[Floats, Ints]:
         )
     if not (edge_table(faces).face_counts == 1).any():
         raise GeometryError("the surface is closed, and no sheet", remedy="extrude a part of it", element="shape")
-    agree = orient_faces(faces, face_areas(mesh.vertices[faces]), mesh.n_vertices)
-    return mesh.vertices, np.where(agree.turned[:, None], faces[:, ::-1], faces)
+    return mesh.vertices, agreeing_faces(TriangleMesh(mesh.vertices, faces))

@@ -18,9 +18,9 @@ from ..errors import SourceError
 from ..grids.blocks import BLOCK
 from ..memory import refuse_beyond_memory
 from ..mesh.arrangement import arranged
-from ..mesh.components import connected_components, numbered
+from ..mesh.components import connected_components
 from ..mesh.edges import edge_table
-from ..mesh.triangles import area_vectors, face_areas, side_lengths
+from ..mesh.triangles import area_vectors, cut_small, face_areas, side_lengths
 from ..mesh.unit_vectors import unit
 from ..parallel import PointTree
 from ..search.face_tree import FaceTree
@@ -104,7 +104,8 @@ def sealed(mesh: TriangleMesh, length: float) -> tuple[TriangleMesh, Ints, LeftO
     triangles = pieces.points[pieces.faces]
     flood = Flood.around(triangles, length)
     normals = unit(area_vectors(triangles))
-    owners, places = _spread(triangles, flood.spacing)
+    parts, owners = cut_small(triangles, lambda pieces: side_lengths(pieces).max(axis=1) <= flood.spacing)
+    places = parts.mean(axis=1)
     n = len(triangles)
     outside = np.zeros((n, 2), dtype=bool)  # in front of each piece, and behind it
     shallow = np.ones(n, dtype=bool)
@@ -138,17 +139,3 @@ def sealed(mesh: TriangleMesh, length: float) -> tuple[TriangleMesh, Ints, LeftO
     note = LeftOut(len(lost), share, int(np.isin(lost, pieces.origins[kept]).sum()))
     used, faces = np.unique(faces, return_inverse=True)
     return TriangleMesh(pieces.points[used], faces.reshape(-1, 3)), pieces.origins[kept], note
-
-
-def _spread(triangles: Floats, step: float) -> tuple[Ints, Floats]:
-    """Return places within (m, 3, 3) triangles, about a step apart, at least one in each, and the triangle of each."""
-    counts = np.maximum(np.ceil(side_lengths(triangles).max(axis=1) / step), 1).astype(np.int64)
-    owners, number = numbered(counts**2)
-    n = counts[owners]
-    row = np.floor(np.sqrt(number)).astype(np.int64)  # n² small triangles, 2 row + 1 in each row
-    place = number - row**2
-    up, half = place // 2, place % 2
-    u, v = (row - up + (1 - 2 * half) / 3.0) / n, (up + (1 + half) / 3.0) / n
-    corners = triangles[owners]
-    steps = corners[:, 1:] - corners[:, :1]
-    return owners, corners[:, 0] + u[:, None] * steps[:, 0] + v[:, None] * steps[:, 1]

@@ -23,7 +23,7 @@ from ..memory import refuse_beyond_memory
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..mesh.components import connected_components, sums_of
 from ..mesh.edges import edge_table
-from ..mesh.triangles import CREASE_ANGLE, area_vectors, corner_normals, face_areas, halved
+from ..mesh.triangles import CREASE_ANGLE, area_vectors, corner_normals, cut_small, face_areas
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import indexed
 from ..packages import lazy_module
@@ -249,7 +249,7 @@ def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
         lambda n: 400.0 * n,  # measured on a ball cut into 240,000 pieces
         lambda fits: f"lower the resolution from {parts} to {int(parts * np.sqrt(fits / pieces))}",
     )
-    triangles, owners = _cut(solid.outward, largest)
+    triangles, owners = cut_small(solid.outward, lambda pieces: face_areas(pieces) <= 0.5 * largest * largest)
     places = triangles.mean(axis=1)
     walls = solid.bounding[solid.features.ids]
     facing = np.where(walls[:, None], solid.features.face_normals, 0.0)
@@ -325,18 +325,6 @@ def _quantile(widths: Floats, share: float) -> float | None:
     """Return a quantile of the widths that are not NaN; None if there are none."""
     known = np.sort(widths[~np.isnan(widths)])
     return float(known[int(share * len(known))]) if len(known) else None
-
-
-def _cut(triangles: Floats, longest: float) -> tuple[Floats, Ints]:
-    """Halve triangles at their longest sides until none exceeds half a square; return them, and their originals."""
-    owners, kept, whose = np.arange(len(triangles)), [], []
-    while len(triangles):
-        small = face_areas(triangles) <= 0.5 * longest * longest
-        kept.append(triangles[small])
-        whose.append(owners[small])
-        triangles, owners = halved(triangles[~small]), np.tile(owners[~small], 2)
-    order = np.argsort(np.concatenate(whose), kind="stable")
-    return np.concatenate(kept)[order], np.concatenate(whose)[order]
 
 
 @compiled
