@@ -183,3 +183,20 @@ def test_progress_never_goes_back(mesh, pieces, intrinsic):
         sh.signed_distance(curves, mesh, intrinsic=intrinsic, progress=lambda done, step: told.append(done))
         assert told == sorted(told) and told[-1] == 1.0
         told.clear()
+
+
+@pytest.mark.parametrize(("below", "above", "gap"), [(0.013, 0.2, 0.8), (0.013, 0.3, 1.2), (-0.1, 0.4, 1.2)])
+def test_gaps_beside_other_curves_are_closed_straight(below, above, gap):
+    """Heat from the nearer rim of a band bends the line across a gap in the other away from it."""
+    ball = sphere(4)
+
+    def parallel(z: float, begin: float, gap: float) -> sh.Curve:
+        angle = begin + np.linspace(0, 2 * np.pi - gap, 80)
+        radius = np.sqrt(1 - z * z)
+        return ball.polyline(np.stack([radius * np.cos(angle), radius * np.sin(angle), 0 * angle + z], axis=1))
+
+    given = [parallel(below, 0.0, gap), parallel(above, np.pi, 0.05).reversed()]
+    height = ball.vertices[:, 2]
+    within = (height > below) & (height < above)
+    wrong = (sh.signed_distance(given, ball).values > 0) != within
+    assert wrong.sum() <= 0.01 * within.sum()

@@ -24,13 +24,15 @@ from ..methods import SOURCE_TOLERANCE
 from ..shapes.foreign import as_list
 from ..shapes.kinds import AnySurface, SurfaceDomain
 from ..solver import SignedHeatSolver, distance_unwarned, field_without_heat
+from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
-from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
+from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
 from ..surfaces.surface_sharpening import distance_without_heat
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag
+from .gaps import Gaps
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, with_turned
 
@@ -63,6 +65,9 @@ reason alone, and both are wrong."""
 
 MOST_LEFT_OUT = 0.25
 """There is a warning if more than this share of the length of the curves is left out."""
+
+GAP_EDGES = 2.0
+"""Gaps narrower than so many edges are left to heat."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 
@@ -135,6 +140,9 @@ def distance_to_pieces(
     left_out = pieces.curves(decision.loose)
     taken = [curve for k, curve in enumerate(with_turned(listed, turn)) if k not in set(left_out.tolist())]
     field = distance_unwarned(once, taken, constraint)
+    closing = closing_curves(field, taken, GAP_EDGES * float(pieces.strokes.surface.triangles.lengths_of_edges.mean()))
+    if closing:
+        field = distance_unwarned(once, [*taken, *closing], constraint)
     turn[left_out] = False
     share = float(pieces.strokes.lengths[decision.loose].sum() / pieces.strokes.lengths.sum())
     if turn.any() or len(left_out):
@@ -155,6 +163,24 @@ def distance_to_pieces(
     if reason:
         warn_user(reason, InexactWarning)
     return field, taken
+
+
+def closing_curves(field: Field[Surface], curves: Sequence[CurveOrPoints], least: float) -> list[Curve]:
+    """Return shortest paths across gaps longer than `least` of curves that nearly close, where heat bulges."""
+    surface = field.domain.mesh if isinstance(field.domain, IntrinsicTriangulation) else field.domain
+    lines = [curve for curve in curves if isinstance(curve, Curve) and curve.oriented]
+    strokes = [curve for curve in lines if not curve.closed]
+    points, closed = [surface.positions(c) for c in strokes], [surface.positions(c) for c in lines if c.closed]
+    gaps = Gaps.of(points) if points else None
+    zero_set = [surface.positions(c) for c in field.contour(0.0)] if gaps and len(gaps.strokes) else []
+    if not gaps or not zero_set:
+        return []
+    paths = []
+    for tail, head in gaps.bulging(points, closed, np.concatenate(zero_set), least).tolist():
+        ends = ((strokes[tail], [-1]), (strokes[head], [0]))
+        path = surface.shortest_path(*(SurfacePoints(curve.faces[at], curve.barycentric[at]) for curve, at in ends))
+        paths.append(Curve(path.faces, path.barycentric))
+    return paths
 
 
 def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:

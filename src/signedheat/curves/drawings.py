@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, Literal, cast
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike
 
 from ..arrays import Bools, Floats, Frozen, Ints
@@ -21,7 +20,7 @@ from ..grids.grid import RESOLUTION, Grid
 from ..grids.marching import values_at_walls
 from ..grids.polyline import Polyline
 from ..jobs import Progress, Stopwatch, growing, within
-from ..mesh.components import connected_components, sums_of
+from ..mesh.components import sums_of
 from ..mesh.polylines import FillRule, without_seams
 from ..mesh.unit_vectors import unit
 from ..search.face_tree import FaceTree
@@ -34,6 +33,7 @@ from ..surfaces.source_segments import NEARLY_CLOSED
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import SMALLEST_EXTENT, flag, query_points, shaped
 from .curve_distance import CurvesTaken, distance_to_pieces
+from .gaps import Gaps
 from .outlines import outlines_filled
 from .resolution import on_resolving_triangles
 
@@ -139,19 +139,9 @@ def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
 
 
 def closing_lines(lines: Sequence[Polyline]) -> list[Polyline]:
-    """Return straight lines across the gaps of curves that nearly close, from the end of a stroke to the next one.
-
-    Strokes are one curve if they follow each other, each the nearest one to the end of the last.
-    """
+    """Return straight lines across the gaps of curves that nearly close, from the end of a stroke to the next one."""
     strokes = [line for line in lines if not line.closed]
-    if not strokes:
-        return []
-    begins, ends = (np.array([line.points[k] for line in strokes]) for k in (0, -1))
-    gaps, following = scipy.spatial.cKDTree(begins).query(ends)
-    curve = connected_components(len(strokes), np.arange(len(strokes)), following)
-    closes = np.bincount(curve, gaps) < NEARLY_CLOSED * np.bincount(curve, [line.length for line in strokes])
-    wide = np.flatnonzero(closes[curve] & (gaps > 0))
-    return [Polyline([ends[k], begins[following[k]]]) for k in wide.tolist()]
+    return [Polyline(line) for line in Gaps.of([line.points for line in strokes]).lines] if strokes else []
 
 
 def bulges(phi: Field[Grid[Literal[2]]], lines: Sequence[Polyline], closing: Sequence[Polyline]) -> bool:
