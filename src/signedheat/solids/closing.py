@@ -24,9 +24,8 @@ from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from ..parallel import PointTree
 from . import lids, walls
-from .lids import Lid, running_mean, vertex_normals
+from .lids import Frame, Lid, frame_of, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges, turning
-from .spanning import Frame, frame_of
 
 STRIP_WIDTH = 0.25
 """Width of the strip of surface around an opening that is sampled, relative to the opening's width."""

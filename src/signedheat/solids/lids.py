@@ -10,15 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..mesh.components import numbered, sums_of
 from ..mesh.planar_triangulation import triangulate_polygon
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..parallel import PointTree
-from . import spanning
 from .rims import corners_of
-from .spanning import Frame, area_vector, frame_of, points_inside
 
 LOOP_POINTS = 128
 """Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""
@@ -31,6 +29,12 @@ PLATE_AT_REST, PLATE_MOVES = 1e-3, 64
 this number of moves. Nearly all plates rest after 5 to 40 moves."""
 RIM_CLEARANCE = 0.5
 """Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of its points."""
+LAYER_GROWTH = 0.35
+"""Growth of triangles with their distance from the rim, relative to that distance."""
+MOST_TIES = 128
+"""Maximum number of equally distant points of a loop that are compared, and number of places compared for each."""
+Frame = tuple[Floats, Floats]
+"""Origin and (3, 2) axes of a plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +44,49 @@ class Lid:
     vertices: Floats  # (n, 3) the points of the rim first, in order
     faces: Ints  # (m, 3) counterclockwise from outside
     n_rim: int  # how many points the rim has
-
-
-@dataclass(frozen=True, eq=False)
-class Film(Lid):
-    """A lid that was triangulated in a plane, or over a disc."""
-
-    plane: Floats  # (n, 2) its vertices in the plane or disc
+    plane: Floats  # (n, 2) its vertices in the plane or disc in which it was triangulated
     places: Floats  # (n_rim,) share of the loop's length at which each point of its rim lies
+
+
+def frame_of(rim: Floats) -> Frame | None:
+    """Return the plane of a loop's area through its centre, with axes for which it is counterclockwise; or None."""
+    normal = area_vector(rim)
+    length = np.linalg.norm(normal)
+    if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
+        return None
+    normal /= length
+    lengths, middles = side_lengths(rim), 0.5 * (rim + np.roll(rim, -1, axis=0))
+    centre = rim[0] + (lengths[:, None] * (middles - rim[0])).sum(axis=0) / lengths.sum()
+    around = rim - rim.mean(axis=0)
+    around -= np.outer(around @ normal, normal)
+    reach = np.linalg.norm(around, axis=1)
+    first = around[farthest(rim, reach)]  # this axis turns with the rim
+    first = first / np.linalg.norm(first)
+    return centre, np.stack([first, np.cross(normal, first)], axis=1)
+
+
+def farthest(loop: Floats, away: Floats) -> int:
+    """Find the point of a closed loop that is farthest away; of equal ones, that after which the loop stays farther."""
+    ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:MOST_TIES]
+    if len(ties) == 1:
+        return int(ties[0])
+    starts = shares_of(loop)[0]
+    onward = (starts[ties, None] + np.arange(MOST_TIES) / MOST_TIES) % 1.0
+    far = np.interp(onward, starts, np.append(away, away[0])) / max(float(away.max()), 1e-300)
+    return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
+
+
+def shares_of(loop: Floats) -> tuple[Floats, float]:
+    """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
+    lengths = side_lengths(loop)
+    along = np.concatenate([[0.0], np.cumsum(lengths)])
+    return along / along[-1], float(along[-1])
+
+
+def area_vector(loop: Floats) -> Floats:
+    """(3,) the area that a closed loop encloses, along its normal."""
+    around = loop - loop.mean(axis=0)
+    return 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +104,7 @@ class SmoothRim:
     def of(cls, corners: Floats) -> SmoothRim:
         """Smooth a loop."""
         sides = np.roll(corners, -1, axis=0) - corners
-        starts, length = spanning.shares_of(corners)
+        starts, length = shares_of(corners)
         steps = np.diff(starts)[:, None]
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
@@ -78,7 +117,7 @@ class SmoothRim:
             return np.asarray(turns[:, None] * sums[-1] + sums[k] + onward)
 
         away = np.linalg.norm(corners - sums[-1], axis=1)
-        first = starts[spanning.farthest(corners, away)]
+        first = starts[farthest(corners, away)]
         places = first + np.arange(LOOP_POINTS + 1) / LOOP_POINTS
         ends = integral(places[:-1] + 0.5 * RIM_SMOOTHING), integral(places[:-1] - 0.5 * RIM_SMOOTHING)
         return cls(length, starts, (ends[0] - ends[1]) / RIM_SMOOTHING, places)
@@ -96,26 +135,69 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
     return edges, number / counts[edges]
 
 
-def pattern(rim: SmoothRim, frame: Frame | None) -> Film | None:
+def pattern(rim: SmoothRim, frame: Frame | None) -> Lid | None:
     """Triangulate a film in a plane, or in a disc if there is no frame; None if its loop crosses itself there."""
     if frame is None:
         flat = _around_disc(rim.places[:-1])
-        inner = spanning.points_in_disc(len(flat))
+        inner = points_in_disc(len(flat))
     else:
         flat = (rim.points - frame[0]) @ frame[1]
-        inner = spanning.points_inside(flat)
+        inner = points_inside(flat)
     n, faces = len(flat), triangulate_polygon(np.concatenate([flat, inner]), len(flat))
     if faces is None:
         return None
     faces, inner = _without_unused(faces, n, inner)
     first = np.zeros((len(inner), 3)) if frame is None else frame[0] + inner @ frame[1].T
-    return Film(np.concatenate([rim.points, first]), faces, n, np.concatenate([flat, inner]), rim.places[:-1])
+    return Lid(np.concatenate([rim.points, first]), faces, n, np.concatenate([flat, inner]), rim.places[:-1])
 
 
 def _without_unused(faces: Ints, n: int, inner: Floats) -> tuple[Ints, Floats]:
     """Return faces and those of the points after the first n that they use."""
     used = np.unique(faces[faces >= n])
     return np.where(faces < n, faces, n + np.searchsorted(used, faces)), inner[used - n]
+
+
+def points_inside(polygon: Floats) -> Floats:
+    """Points within a polygon of few sides, as dense as its corners at its rim, and sparser away from it."""
+    steps = side_lengths(polygon)
+    size = float(np.quantile(steps, 0.9))
+    low, high = polygon.min(axis=0), polygon.max(axis=0)
+    tree = PointTree(polygon)
+    layers = [np.zeros((0, 2))]
+    begin = 0.75 * size
+    while begin < 0.5 * float((high - low).max()):
+        step = size if len(layers) == 1 else LAYER_GROWTH * begin + size
+        end = begin + 2.0 * step
+        rows = np.arange(low[1], high[1] + step, step * 0.75**0.5)
+        columns = np.arange(low[0], high[0] + step, step)
+        shifted = np.add.outer(0.5 * step * (np.arange(len(rows)) % 2), columns)
+        points = np.stack([shifted.ravel(), np.repeat(rows, len(columns))], axis=1)
+        away = tree.query(points)[0]
+        layers.append(points[(away >= begin) & (away < end)])
+        begin = end + 0.5 * step
+    points = np.concatenate(layers)
+    return points[_inside(points, polygon)]
+
+
+def _inside(points: Floats, polygon: Floats) -> Bools:
+    """(k,) whether points lie inside a polygon: by the parity of crossings."""
+    x, y = points.T
+    (ax, ay), (bx, by) = polygon.T[..., None], np.roll(polygon, -1, axis=0).T[..., None]
+    rise = np.where(by == ay, 1.0, by - ay)  # level sides are not crossed
+    crosses = ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / rise)
+    return np.logical_xor.reduce(crosses, axis=0)
+
+
+def points_in_disc(n: int) -> Floats:
+    """Points within the unit circle, as dense as n points around it at its rim, and sparser away from it."""
+    rings, radius, step, turn = [np.zeros((1, 2))], 1.0, 2 * np.pi / n, 0.0
+    while (radius := radius - step * 0.87) >= step:
+        count = max(int(np.ceil(2 * np.pi * radius / step)), 5)
+        turn += np.pi / count
+        angles = turn + 2 * np.pi * np.arange(count) / count
+        rings.append(radius * np.stack([np.cos(angles), np.sin(angles)], axis=1))
+        step *= 1 + LAYER_GROWTH
+    return np.concatenate(rings)
 
 
 EVEN_SHARE = 1e-3
@@ -127,7 +209,7 @@ def _around_disc(shares: Floats) -> Floats:
     return np.stack([np.cos(2 * np.pi * shares), np.sin(2 * np.pi * shares)], axis=1)
 
 
-def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Film) -> tuple[Floats, Ints] | None:
+def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Lid) -> tuple[Floats, Ints] | None:
     """Span a loop with inner points of another lid: added points, and triangles; None if its image crosses itself."""
     n, inner = len(loop), over.plane[over.n_rim :]
     kept = np.ones(len(inner), dtype=bool)
@@ -161,7 +243,7 @@ def _in_polygon(shares: Floats, points: Floats) -> Floats:
     return points * (np.cos(2 * np.pi * half) / np.cos(2 * np.pi * (turns - middle)))[:, None]
 
 
-def film(pattern: Film) -> Film:
+def film(pattern: Lid) -> Lid:
     """Make the lid of nearly least area (Pinkall & Polthier 1993), within the convex hull of its rim."""
     n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
     if n == len(vertices):
@@ -191,7 +273,7 @@ def _extended(matrix: sparse.csr_array, values: Floats) -> Floats:
     return np.concatenate([values, sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))])
 
 
-def plate(lid: Film, normals: Floats, curvatures: Floats, held: Floats, width: float) -> Film | None:
+def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: float) -> Lid | None:
     """Bend a lid as a thin plate whose rest shape is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / (m_v + s_v)``. L is the cotangent Laplacian, m the areas of

@@ -11,9 +11,8 @@ from ..mesh.components import connected_components, next_in_groups
 from ..mesh.triangles import side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..parallel import PointTree
-from .lids import SmoothRim
+from .lids import SmoothRim, area_vector
 from .rims import ALONG_EDGE, corners_of, opposite_edges
-from .spanning import area_vector
 
 NARROW = 0.3
 """A strip at right angles to the surface closes two rims if its area, relative to that of flat lids on both, is at most
