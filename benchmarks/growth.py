@@ -167,6 +167,34 @@ def bars(n: int) -> Callable[[], object]:
     return lambda: sh.complete(shape, keep_overlaps=True)  # all pieces are the output
 
 
+def nested_shells(n: int) -> Callable[[], object]:
+    """The solid of n closed balls, each in the next."""
+    ball = samples.sphere(2)
+    shape = copies(ball, [ball.vertices * radius for radius in np.linspace(0.2, 1.0, n)])
+    return lambda: sh.complete(shape)
+
+
+def panels(n: int) -> Callable[[], object]:
+    """The solid of a ball in n panels from pole to pole, with gaps between their long rims."""
+    turn, height = np.meshgrid(np.linspace(0, 0.999, 3), np.linspace(-0.45, 0.45, 24) * np.pi)
+    corner = np.arange(72).reshape(24, 3)[:-1, :-1].ravel()
+    faces = np.concatenate([corner[:, None] + [0, 1, 4], corner[:, None] + [0, 4, 3]])
+    places = []
+    for k in range(n):
+        angle = 2 * np.pi * (k + turn) / n
+        place = np.cos(height) * np.cos(angle), np.cos(height) * np.sin(angle), np.sin(height)
+        places.append(np.stack(place, axis=-1).reshape(-1, 3))
+    shape = copies(sh.TriangleMesh(places[0], faces), places)
+    return lambda: sh.complete(shape)
+
+
+def collinear_faces(n: int) -> Callable[[], object]:
+    """The solid of n triangles between random points of one line, which only rounding gives areas."""
+    rng = np.random.default_rng(5)
+    shape = sh.TriangleMesh(rng.random((n, 1)) * [[1, 2, 3]], rng.integers(0, n, (n, 3)))
+    return lambda: sh.complete(shape)
+
+
 def overlapping_balls(n: int) -> Callable[[], object]:
     """The solid of n balls along a chain, each of which overlaps the next."""
     ball = samples.sphere(2)
@@ -245,6 +273,9 @@ CASES = {
     clustered_balls: 60,
     crossing_faces: 40,
     bars: 5,
+    nested_shells: 32,
+    panels: 16,
+    collinear_faces: 500,
 }
 
 

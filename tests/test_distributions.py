@@ -9,11 +9,13 @@ import sys
 import tarfile
 import venv
 import zipfile
+from importlib.metadata import version as version_of
 from pathlib import Path
 
 import pytest
 
 import signedheat as sh
+from signedheat import compiled
 
 pytest.importorskip("hatchling")
 ROOT = Path(__file__).parents[1]
@@ -52,6 +54,39 @@ def test_the_source_distribution_has_what_the_documents_and_tests_need(built):
     }
     assert wanted <= names
     assert not [name for name in names if "__pycache__" in name or name.startswith((".venv", "dist/"))]
+
+
+@pytest.mark.slow  # it compiles everything, and asks the package index
+def test_a_wheel_with_kernels_compiles_nothing_in_a_fresh_environment(tmp_path):
+    if compiled._kind_of_code() is None:
+        pytest.skip("this processor does not run what wheels carry, or other code is asked for")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, check=True, env={**os.environ, "SIGNEDHEAT_KERNELS": "1"})
+    [wheel] = tmp_path.glob("*.whl")
+    assert "-none-any" not in wheel.name
+    venv.create(tmp_path / "fresh", with_pip=True)
+    programs = tmp_path / "fresh" / ("Scripts" if sys.platform == "win32" else "bin")
+    numba = f"numba=={version_of('numba')}"  # kernels are for the version that compiled them
+    install = [str(programs / "python"), "-m", "pip", "install", "--quiet", "--prefer-binary", str(wheel), numba]
+    subprocess.run([*install, "matplotlib"], check=True)
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+
+    def told(cache: Path, *arguments: str, **more: str) -> str:
+        command = [str(programs / "signedheat"), *arguments]
+        done = subprocess.run(
+            command,
+            cwd=tmp_path,
+            env={**environment, "NUMBA_CACHE_DIR": str(cache), **more},
+            stderr=subprocess.PIPE,
+            text=True,
+            check=True,
+        )
+        return done.stderr
+
+    assert "compiling" not in told(tmp_path / "kernels", "demo", "--output", "demo")
+    (tmp_path / "file").touch()
+    assert "compiling" not in told(tmp_path / "file", "info", "demo/duck.stl")  # this folder cannot be written to
+    assert "compiling" in told(tmp_path / "kernels", "info", "demo/duck.stl", NUMBA_CPU_NAME="generic")
 
 
 @pytest.mark.slow  # it asks the package index
