@@ -299,6 +299,12 @@ def two_balls():
     return sh.TriangleMesh(vertices, np.concatenate([ball.faces, ball.faces + ball.n_vertices]))
 
 
+def lower_half():
+    """A mesh with vertices that are in no face."""
+    ball = sphere(3)
+    return sh.TriangleMesh(ball.vertices, ball.faces[ball.vertices[ball.faces].mean(axis=1)[:, 2] < 0.2])
+
+
 DECIDING = {
     "loop": lambda: (globe := sphere(3), at_height(globe, 0.3)),
     "band": lambda: (globe := sphere(3), [*at_height(globe, 0.4), *(c.reversed() for c in at_height(globe, -0.3))]),
@@ -306,6 +312,7 @@ DECIDING = {
     "from rim to rim": lambda: (plate := disk(6), plate.level_set(plate.vertices[:, 1], 0.13)),
     "points alone": lambda: (globe := sphere(3), [globe.points_at([3, 50])]),
     "one of two parts": lambda: (both := two_balls(), at_height(both, 0.3)[:1]),
+    "vertices without faces": lambda: (part := lower_half(), at_height(part, -0.3)),
     "along edges": lambda: (globe := sphere(3), [globe.path(globe.faces[0], closed=True)]),
 }
 """Curves that lack nothing, and sources without sides, with the mesh that they lie on."""

@@ -195,7 +195,9 @@ def distance_without_heat(
             return None
         decided = (SharpenedToCurves(0.0, 0, float((side != 0).mean())),)
     distance, windows = distance_to_segments(triangles, placed, tolerance, report)
-    return np.where(side < 0, -distance, distance), (*decided, note_on_searches(triangles, windows))
+    signed = np.where(side < 0, -distance, distance)
+    signed[np.isinf(distance)] = np.nan  # vertices without faces, and on other parts
+    return signed, (*decided, note_on_searches(triangles, windows))
 
 
 def connected_to(triangles: IntrinsicMesh, faces: Ints) -> Bools:
