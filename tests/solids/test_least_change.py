@@ -247,3 +247,26 @@ def test_copies_of_which_each_lies_within_the_other_are_one_body(seed):
     cone = vertices, np.concatenate([sides, base])
     copy = vertices + 1e-8 * np.random.default_rng(seed).normal(size=vertices.shape), cone[1]
     assert volume(joined(cone, copy)) == pytest.approx(volume(cone), rel=1e-6)
+
+
+BARS = [((x, y, 0), (x + 1, y + 1, 9)) for x in (0, 8) for y in (0, 5)]
+BARS += [((0, y, z), (9, y + 1, z + 1)) for y in (0, 5) for z in (0, 4, 8)]
+BARS += [((x, 0, z), (x + 1, 6, z + 1)) for x in (0, 8) for z in (0, 4, 8)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("flipped", ["triangles", "bars", "triangles, and some lost"])
+def test_bars_that_cross_and_share_corners_are_a_frame_however_they_face(flipped, seed):
+    """Edges and planes of several bars coincide; by the indices of the mesh, each is a body by itself."""
+    mesh, rng = joined(*[box(*bar) for bar in BARS]), np.random.default_rng(seed)
+    which = np.repeat(rng.random(len(BARS)) < 0.3, 12) if flipped == "bars" else rng.random(12 * len(BARS)) < 0.2
+    kept = rng.random(len(which)) > (0.02 if "lost" in flipped else 0.0)
+    vertices, faces = turned(mesh, which)
+    cells = {
+        cell
+        for low, high in BARS
+        for cell in np.ndindex(10, 10, 10)
+        if all(np.less_equal(low, cell) & np.less(cell, high))
+    }
+    exact = {"rel": 0.03} if "lost" in flipped else {"rel": 1e-9}
+    assert volume((vertices, faces[kept])) == pytest.approx(len(cells), **exact)

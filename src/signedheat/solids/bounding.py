@@ -60,6 +60,7 @@ class Bounding(Frozen):
     # (m,) mean level of the cluster, which is half of the share of the body that is left; ½ for all other triangles
     levels: Floats
     as_given: Bools  # (m,) which count as often as they were given, with all copies
+    reversed: Bools  # (k,) which given triangles run the other way than their distinct one, where they are as given
     inner: Bools  # (m,) walls between closed cells
     orientable: Bools  # (p,) pieces whose faces can be oriented consistently
     disagreeing: int  # number of pairs of neighbours that disagreed
@@ -70,14 +71,16 @@ class Bounding(Frozen):
     def to_turn(self, chain: Chain) -> Bools:
         """(k,) whether each given triangle must turn; triangles on fewer than three places need not."""
         as_given, turned = (np.append(values, False)[chain.numbers] for values in (self.as_given, self.turned))
-        return np.asarray((chain.numbers >= 0) & ((~as_given & chain.reversed) != turned))
+        ways = np.where(as_given, chain.reversed != self.reversed, chain.reversed)
+        return np.asarray((chain.numbers >= 0) & (ways != turned))
 
 
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
     """Decide which triangles bound something and which way they face, or take them as oriented."""
-    given, whole = as_given(chain)
+    given = as_given(chain, chain.reversed)
+    whole = given.whole
     held = ~whole & (as_oriented or nested == "given")  # what does not turn if it is read as given
-    decided = _decided(chain, given, whole, held, nested, as_oriented)
+    decided = _decided(chain, given, held, nested, as_oriented)
     if as_oriented or whole.all():
         return decided
     # pieces as given, and the parts that they are in; loose triangles tell little one by one: they are read together
@@ -108,33 +111,37 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     missing = missing_of(decided)
     readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)
     if cone_volumes(chain.triangles, given.counts, part_of + 1, len(part_areas) + 1).sum() < 0:
-        inside_out = _reversed(given, whole)
-        other = _decided(chain, inside_out, whole, held, nested)
+        inside_out = _reversed(given)
+        other = _decided(chain, inside_out, held, nested)
         left = missing_of(other)
         if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
             readings, decided, missing = [inside_out], other, left
+    agreeing = _with_ways(chain, given, chain.agreeing_as_indexed())
+    outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
     by_odd, by_once, around = odd(chain), once(chain), once_around(chain)
     # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
     doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
-    every, as_cavities = np.ones(len(missing), dtype=bool), "cavities" if nested == "given" else nested
+    as_cavities = "cavities" if nested == "given" else nested
     trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
-        (by_odd, differs(by_odd, by_once), WELL_EXPLAINED, True, nested),
-        (by_once, every, WELL_EXPLAINED, True, nested),
+        (agreeing, differs(agreeing, given), WELL_EXPLAINED, True, nested),
+        (by_odd, differs(by_odd, given) & differs(by_odd, by_once), WELL_EXPLAINED, True, nested),
+        (by_once, doubtful, WELL_EXPLAINED, True, nested),
         (around, differs(around, by_odd) & differs(around, by_once), WELL_EXPLAINED, True, nested),
-        (by_once, every, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
-        (by_once, every, MOSTLY_WRONG, True, as_cavities),
+        (outwards, differs(outwards, agreeing), WELL_EXPLAINED, True, nested),
+        (by_once, doubtful, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
+        (by_once, doubtful, MOSTLY_WRONG, True, as_cavities),
     )
     overlapping = False
     for number, (reading, told, least, united, nesting) in enumerate(trials):
-        todo = doubtful & told & (missing >= least)
-        if not todo.any() or (number > 2 and not overlapping):
+        todo = told & (missing >= least)
+        if not todo.any() or (number > 4 and not overlapping):
             continue
         readings.append(reading)
         best = float(part_areas @ missing), decided, chosen, missing
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
             tried = np.where(~whole & todo[part_of], len(readings) - 1, chosen)
             fixed = held & (tried == 0)
-            other = _decided(chain, mixed(chain, readings, tried), whole, fixed, nesting, united=united)
+            other = _decided(chain, mixed(chain, readings, tried), fixed, nesting, united=united)
             overlapping |= other.overlapping
             left, price = missing_of(other), LEAST_GAIN * changed(decided, other)
             cost = float(part_areas @ (left + price))
@@ -146,7 +153,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
             todo = better
         _, decided, chosen, missing = best
     inside = unexplained(chain, decided.counts, pieces) < MOSTLY_WRONG
-    inner = decided.inner | (~whole & (decided.counts == 0) & inside[pieces])
+    inner = decided.inner | (~whole & ~decided.as_given & (decided.counts == 0) & inside[pieces])
     decided = replace(decided, inner=inner, turned=decided.turned & ~inner)
     return _with_sheets_agreeing(chain, decided, by_once, whole)
 
@@ -177,15 +184,20 @@ def _entangled(chain: Chain, parts: Ints) -> Bools:
     return np.asarray(np.diff(starts) > 1)
 
 
-def _reversed(reading: Reading, whole: Bools) -> Reading:
+def _with_ways(chain: Chain, reading: Reading, reversed: Bools) -> Reading:
+    """Read a chain as given but for triangles that are reversed; a reading for which these are the same is kept."""
+    return reading if np.array_equal(reversed, reading.reversed) else as_given(chain, reversed)
+
+
+def _reversed(reading: Reading) -> Reading:
     """Turn all triangles that are not in whole complexes, which are turned anyway if they face inwards."""
-    return replace(reading, counts=np.where(whole, 1, -1) * reading.counts, turned=reading.turned != ~whole)
+    counts, turned = np.where(reading.whole, 1, -1) * reading.counts, reading.turned != ~reading.whole
+    return replace(reading, counts=counts, turned=turned)
 
 
 def _decided(
     chain: Chain,
     reading: Reading,
-    whole: Bools,
     fixed: Bools,
     nested: Nesting,
     as_oriented: bool = False,
@@ -195,7 +207,7 @@ def _decided(
 
     Open bodies that overlap are `united`, or else they are one body's outside and inside.
     """
-    counts, pieces, orientable = reading.counts, reading.pieces, reading.orientable
+    counts, pieces, orientable, whole = reading.counts, reading.pieces, reading.orientable, reading.whole
     n = len(orientable)
     idle = np.bincount(pieces, counts == 0, n) > 0
     open_pieces = (chain.open_edges(counts, pieces) > 0) | (idle & (np.bincount(pieces, whole, n) == 0))
@@ -228,7 +240,11 @@ def _decided(
         loose[along] = -1
     turned = reading.turned != (flips[pieces] < 0)
     final = (counts * flips[pieces] * bounds[pieces]).astype(np.int64)
-    with_copies = (whole | fixed) & (np.abs(counts) == np.abs(chain.multiplicities)) & ((counts == 0) | bounds[pieces])
+    with_copies = (
+        (whole | fixed)
+        & (np.abs(counts) == np.abs(chain.multiplicities_with(reading.reversed)))
+        & ((counts == 0) | bounds[pieces])
+    )
     with_copies &= (np.bincount(chain.complexes, final != 0) > 0)[chain.complexes]
     inner = (counts == 0) & orientable[pieces] & ~whole & ~fixed
     return Bounding(
@@ -239,6 +255,7 @@ def _decided(
         loose=loose[pieces],
         levels=levels[pieces],
         as_given=with_copies,
+        reversed=reading.reversed,
         inner=inner,
         orientable=orientable,
         disagreeing=reading.disagreeing,

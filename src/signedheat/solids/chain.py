@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, element_components, next_in_groups
 from ..mesh.edges import EdgeTable, FaceOrientation, agreeing, edge_keys, edge_table, orient_faces, pair_halfedges
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.triangles import area_vectors, face_areas, part_volumes
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
 from ..surfaces.triangle_mesh import TriangleMesh
@@ -35,6 +35,7 @@ class Chain(Frozen):
     firsts: Ints  # (m,) first triangle of the mesh on the same corners as each
     numbers: Ints  # (k,) distinct triangle of each given one; −1 for those on fewer than three places
     reversed: Bools  # (k,) which given triangles run the other way than their distinct one
+    given: Ints  # (k, 3) vertices of each given triangle, by the indices of the mesh
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:
@@ -47,7 +48,7 @@ class Chain(Frozen):
         numbers = np.full(len(ids) + 1, -1)
         numbers[distinct] = np.arange(len(distinct))
         exponent = int(np.frexp(max(float(np.ptp(mesh.bounds, axis=0).max()), 1e-300))[1])
-        return cls(np.ldexp(mesh.vertices, -exponent), ids[distinct], distinct, numbers[first], backwards)
+        return cls(np.ldexp(mesh.vertices, -exponent), ids[distinct], distinct, numbers[first], backwards, mesh.faces)
 
     @cached_property
     def triangles(self) -> Floats:
@@ -67,8 +68,12 @@ class Chain(Frozen):
     @cached_property
     def multiplicities(self) -> Ints:
         """(m,) number of times that each triangle is given as it is, minus the number of times reversed."""
+        return self.multiplicities_with(self.reversed)
+
+    def multiplicities_with(self, reversed: Bools) -> Ints:
+        """(m,) multiplicities if these (k,) given triangles are reversed."""
         proper = self.numbers >= 0
-        ways = np.where(self.reversed[proper], -1, 1)
+        ways = np.where(reversed[proper], -1, 1)
         return np.bincount(self.numbers[proper], ways, len(self.faces)).astype(np.int64)
 
     @cached_property
@@ -136,6 +141,20 @@ class Chain(Frozen):
         one, other, edges = self.around_edges(used)
         even = (np.bincount(edges, one != other) % 2 == 0)[edges] & (one != other)
         return one[even], other[even]
+
+    def agreeing_as_indexed(self) -> Bools:
+        """(k,) which given triangles are reversed once those agree that share an edge, by index, with no third one.
+
+        Bodies that touch have vertices of their own where they meet, so that each agrees by itself.
+        """
+        areas = np.append(self.areas, 0.0)[self.numbers]
+        return np.asarray(self.reversed != orient_faces(self.given, areas, len(self.positions)).turned)
+
+    def outwards_as_indexed(self, reversed: Bools) -> Bools:
+        """(k,) which given triangles are reversed once no part, connected by index, encloses a negative volume."""
+        turned = (reversed != self.reversed)[:, None]
+        parts, volumes = part_volumes(self.positions, np.where(turned, self.given[:, ::-1], self.given))
+        return np.asarray(reversed != (volumes < 0)[parts])
 
     def agreeing_across_pairs(self, used: Bools) -> FaceOrientation:
         """Turn triangles so that those agree that share an edge with no third one."""

@@ -3,7 +3,9 @@
 A broken shape can be read in more than one way. *As given* changes nothing: triangles count as often as they are
 there, and what is there once each way cancels. *Odd* takes triangles that are there an odd number of times, and turns
 them to agree: around an edge of two, four, ... triangles the winding number returns, so that neighbours run opposite
-ways. *Once* takes each triangle once, but for walls between closed cells.
+ways. *Once* takes each triangle once, but for walls between closed cells. Both look at places alone. The indices of a
+mesh say more where bodies touch: *as given* is also read once triangles agree that share an edge by index, and once
+what is connected by index faces outwards.
 
 A reading is judged by the share of the area that it leaves unexplained. The winding number is a whole number on both
 sides of a face that bounds a solid, and at least 1 behind it; a face that does not count lies inside.
@@ -38,22 +40,24 @@ class Reading:
     pieces: Ints  # (m,) piece of each triangle
     orientable: Bools  # (p,) pieces whose triangles can agree
     disagreeing: int  # number of pairs of neighbours that disagreed
+    reversed: Bools  # (k,) which given triangles run the other way than their distinct one
+    whole: Bools  # (m,) which are in complexes that close as given and face one way
 
 
-def as_given(chain: Chain) -> tuple[Reading, Bools]:
-    """Read a chain as it was given, and find the (m,) triangles of complexes that close as given and face one way.
+def as_given(chain: Chain, reversed: Bools) -> Reading:
+    """Read a chain as it was given, but for the (k,) given triangles that run the other way than their distinct one.
 
-    Copies count as often as they are there, or once if that leaves fewer edges open.
+    Copies count as often as they are there, or once if that leaves no more edges open.
     """
-    complexes, often = chain.complexes, chain.multiplicities
+    complexes, often = chain.complexes, chain.multiplicities_with(reversed)
     left_open, left_once = (chain.open_edges(counts, complexes) for counts in (often, np.sign(often)))
-    counts = np.where((left_once < left_open)[complexes], np.sign(often), often)
+    counts = np.where((left_once <= left_open)[complexes], np.sign(often), often)
     closes = (np.minimum(left_open, left_once) == 0) & (np.bincount(complexes, counts != 0) > 0)
     whole = _one_way(chain, counts, closes)
     turned = np.zeros(len(counts), dtype=bool)
     if whole.all():
         every = np.ones(int(complexes.max(initial=-1)) + 1, dtype=bool)
-        return Reading(counts, turned, complexes, every, 0), whole
+        return Reading(counts, turned, complexes, every, 0, reversed, whole)
     used = (counts != 0) & ~whole
     one, other = chain.neighbors(used)
     forward = chain.edges.forward.ravel() != np.repeat(counts < 0, 3)
@@ -61,7 +65,7 @@ def as_given(chain: Chain) -> tuple[Reading, Bools]:
     parts = connected_components(len(counts), one[opposite] // 3, other[opposite] // 3)
     pieces = np.unique(np.where(whole, len(parts) + complexes, parts), return_inverse=True)[1]
     every = np.ones(int(pieces.max()) + 1, dtype=bool)
-    return Reading(counts, ~whole & (counts < 0), pieces, every, 0), whole
+    return Reading(counts, ~whole & (counts < 0), pieces, every, 0, reversed, whole)
 
 
 def _one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
@@ -102,7 +106,9 @@ def once_around(chain: Chain) -> Reading:
 def _read(chain: Chain, used: Bools, agreed: FaceOrientation) -> Reading:
     """Read the used triangles of a chain as they agree."""
     counts = np.where(agreed.turned, -1, 1) * (agreed.orientable[agreed.parts] & used)
-    return Reading(counts, agreed.turned & used, agreed.parts, agreed.orientable, agreed.disagreeing)
+    nothing = np.zeros(len(counts), dtype=bool)
+    pieces, turned = agreed.parts, agreed.turned & used
+    return Reading(counts, turned, pieces, agreed.orientable, agreed.disagreeing, chain.reversed, nothing)
 
 
 def walls(chain: Chain) -> Bools:
@@ -135,14 +141,18 @@ def mixed(chain: Chain, readings: Sequence[Reading], chosen: Ints) -> Reading:
     if (chosen == chosen[:1]).all():
         return readings[int(chosen[0])] if len(chosen) else readings[0]
     rows = np.arange(len(chosen))
-    counts, turned = (
-        np.stack([getattr(reading, name) for reading in readings])[chosen, rows] for name in ("counts", "turned")
+    counts, turned, whole = (
+        np.stack([getattr(reading, name) for reading in readings])[chosen, rows]
+        for name in ("counts", "turned", "whole")
     )
     firsts = np.cumsum([0, *(len(reading.orientable) for reading in readings)])
     pieces = np.stack([reading.pieces + first for reading, first in zip(readings, firsts[:-1], strict=True)])
     used, labels = np.unique(pieces[chosen, rows], return_inverse=True)
     orientable = np.concatenate([reading.orientable for reading in readings])[used]
-    return Reading(counts, turned, labels, orientable, max(reading.disagreeing for reading in readings))
+    disagreeing = max(reading.disagreeing for reading in readings)
+    given = np.append(chosen, 0)[chain.numbers]
+    ways = np.stack([reading.reversed for reading in readings])[given, np.arange(len(given))]
+    return Reading(counts, turned, labels, orientable, disagreeing, ways, whole)
 
 
 def unexplained(chain: Chain, counts: Ints, pieces: Ints) -> Floats:
