@@ -11,8 +11,9 @@ from shapes.bodies import box
 from shapes.domain_cases import ball, error, globe, sphere_points
 from shapes.surface_cases import book
 from shapes.surfaces import disk
+from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.diagnostics import SharpenedToCurves, SmallLoops
-from signedheat.errors import CancellingNormalsError
+from signedheat.errors import CancellingNormalsError, InexactWarning
 from signedheat.samples import sphere, torus
 
 
@@ -350,3 +351,12 @@ def test_heat_where_curves_leave_sides_open(curves, monkeypatch):
     monkeypatch.setattr("signedheat.solver.diffuse", refuse)
     with pytest.raises(InterruptedError):
         sh.signed_distance(given, mesh)
+
+
+def test_loops_side_by_side_are_read_as_before():
+    """Two loops much less than a triangle apart, which run against each other: a band, or a loop drawn twice."""
+    globe = sphere(3)
+    curves = [*at_height(globe, 0.1), *(curve.reversed() for curve in at_height(globe, 0.1001))]
+    with pytest.warns(InexactWarning, match="ran against"):
+        phi = sh.signed_distance(curves, globe)
+    assert len(phi.diagnostics.note(CurvesTaken).turned) == 1

@@ -34,7 +34,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag
 from .gaps import Gaps
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
-from .stroke_directions import CurvePieces, Decision, decide, pieces_for_all, with_turned
+from .stroke_directions import CurvePieces, Decision, bound_as_given, decide, pieces_for_all, with_turned
 
 
 def warn_of_gaps(mesh: object) -> None:
@@ -307,13 +307,18 @@ def distance_to_curves(
     numbers = numbers_given(listed, left_out)
 
     def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints | None]:
-        by = triangulated_once(by, flattened(listed))
-        exact = distance_by_sides(by, listed, progress)
-        if exact is not None:
-            return exact, None
+        flat = flattened(listed)
+        by = triangulated_once(by, flat)
+        surface_of(by).segments(flat)  # refuses curves that do not fit
+        pieces = None
+        if not as_oriented:
+            pieces = CurvePieces.of(surface_of(by), flat) if is_default else pieces_for_all(solver.domain, flat)
+        if pieces is None or bound_as_given(pieces):
+            exact = distance_by_sides(by, listed, progress)
+            if exact is not None:
+                return exact, None
         if as_oriented:
             return distance_unwarned(by, given, constraint), listed
-        pieces = None if is_default else pieces_for_all(solver.domain, flattened(listed))
         return distance_to_pieces(by, listed, constraint, every_piece, numbers, pieces)
 
     field, taken = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)

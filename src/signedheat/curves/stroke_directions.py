@@ -11,6 +11,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints, ShortRepr, mask_of
 from ..errors import UnsupportedTypeError
+from ..geodesics.geodesic_sources import PlacedSegments
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at, joined_end_to_end, without_copies
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -23,6 +24,7 @@ from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation
 from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.surface_discretization import SurfaceDiscretization
+from ..surfaces.surface_sharpening import curve_sides
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .strokes import EQUAL_COSTS, EXPLAINED, Inside, Strokes
 
@@ -208,6 +210,16 @@ def _ends_on(triangles: IntrinsicMesh, part: CurveSegments, is_edge: Bools) -> b
     on = mask_of(triangles.n_vertices, triangles.edges.vertices[is_edge])
     ends = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
     return all(bool(on[ends[end].indices].all()) for end in (0, 1))
+
+
+def bound_as_given(pieces: CurvePieces) -> bool:
+    """Whether strokes without ends, as they are given, have one side each, and the other, all along."""
+    strokes = pieces.strokes
+    if pieces.is_piece.any():
+        return False
+    triangles = strokes.surface.triangles
+    sides = curve_sides(triangles, PlacedSegments.of(triangles, strokes.parts)).regions
+    return bool((strokes.means @ sides >= 1.0 - EQUAL_COSTS).all())
 
 
 def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
