@@ -132,6 +132,32 @@ def test_polygons_that_cross_or_touch_themselves_are_refused():
     assert len(triangulate_polygon(touching, 5)) == 3
 
 
+def test_points_in_one_place_and_on_one_line_end():
+    """Rounding decides on which side of each other these lie: no walk is endless, and none leaves memory."""
+    random = np.random.default_rng(5)
+    for _ in range(200):
+        points = random.random((30, 2)) * [1.0, 10.0 ** -random.integers(0, 17)]
+        points[random.integers(20, 30, 4)] = points[0]
+        faces = triangulate_polygon(points, int(random.integers(3, 20)))
+        assert faces is None or faces.max() < 30
+        near = points[:12] * 10.0 ** -random.integers(0, 16)
+        given = np.concatenate([CORNERS, near[near.sum(axis=1) < 1], near[:2]])
+        ends = random.integers(0, len(given), (8, 2))
+        made, _, triangles, _, _, _ = triangulate_crossing(given, np.array([1, 2, 3]), ends, ZERO_COORDINATE)
+        assert triangles.max() < len(made) < 2000
+
+
+def test_polygons_agree_with_shapely():
+    shapely = pytest.importorskip("shapely")
+    random = np.random.default_rng(7)
+    for _ in range(300):
+        n = int(random.integers(3, 12))
+        turns = np.sort(random.random(n)) * 2 * np.pi
+        loop = np.stack([np.cos(turns), np.sin(turns)], axis=1) * random.uniform(0.02, 1, (n, 1))
+        simple = shapely.Polygon(loop).is_valid and shapely.Polygon(loop).exterior.is_ccw
+        assert (triangulate_polygon(loop, n) is not None) == simple
+
+
 def test_rows_of_points_take_time_in_proportion():
     """Inserted in order, each point of one side would change the edges to all points of the other."""
     row = np.linspace(0, 1, 50_000)

@@ -19,7 +19,8 @@ FLIP_TRIES = 64
 """Attempts to flip, per edge that a segment crosses, after which rounding is taken to prevent the flips. Where
 rounding did not, ten sufficed, even across a thousand edges."""
 ROUNDS = 100
-"""Attempts to go on along a segment, beside one for each triangle, after which it ends early."""
+"""Attempts to go on along a segment, beside one for each triangle, and number of points where it crosses others, beside
+one for each of them, after which it ends early."""
 
 
 class Planar(NamedTuple):
@@ -97,28 +98,46 @@ def triangulate_crossing(
     ways.clear()
     for s in range(len(segments)):
         begin, b = segments[s]
-        a, done = begin, np.zeros(1)
+        a, done, last, most = begin, np.zeros(1), -1.0, mesh.room[0] + s + ROUNDS
         ways.append(a)
         for _ in range(ROUNDS + mesh.room[1]):
             points = mesh.room[0]
             a = _connect(mesh, begin, done, a, b, ways)
-            if a == b:
+            if a == b or mesh.room[0] > most:  # it crosses each of the s segments before it once, but for rounding
                 break
-            if mesh.room[0] > points:
-                continue
             if points == len(mesh.x):
                 mesh = _with_room(mesh)
                 continue
+            if mesh.room[0] > points and done[0] > last:  # else the point that was added before was not met
+                last = done[0]
+                continue
             goal = _beside(mesh, begin, done, a, b)
+            if goal < 0:
+                break
             _fix(mesh, a, goal)
             done[0] = max(done[0], _share(mesh.x, begin, b, goal))
             ways.append(goal)
             a = goal
         starts[s + 1] = len(ways)
-    _improve(mesh)
     total, last = mesh.room
     across = np.where(mesh.fixed, -1, mesh.adj)
     return mesh.x[:total], mesh.parents[n:total], mesh.tri[:last], across[:last], np.array(ways), starts
+
+
+@compiled
+def _triangulate_apart(x: Floats, corners: Ints, segments: Ints) -> tuple[Ints, Ints]:
+    """Return Delaunay triangles and those across their edges, as `triangulate_crossing`; none if segments meet."""
+    none, size = np.empty((0, 3), np.int64), max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
+    mesh = _rim(x, corners, FLAT_HEIGHT * size, FLAT_HEIGHT * size)
+    for i in range(corners[2], len(x)):
+        _insert(mesh, i)
+    for s in range(len(segments)):
+        begin, end = segments[s]
+        way = [begin]
+        if _connect(mesh, begin, np.zeros(1), begin, end, way) != end or len(way) != 2:
+            return none, none
+    _improve(mesh)
+    return mesh.tri, np.where(mesh.fixed, -1, mesh.adj)
 
 
 AROUND = np.array([[-3.0, -2.0], [3.0, -2.0], [0.0, 3.0]])
@@ -130,17 +149,18 @@ def triangulate_polygon(points: Floats, n: int) -> Ints | None:
 
     Of the other points, those within are used, too. None if the polygon crosses or touches itself, or runs clockwise.
     """
-    lower, upper = points.min(axis=0), points.max(axis=0)
-    size = float((upper - lower).max())
-    around = 0.5 * (lower + upper) + size * AROUND
+    size = float(np.ptp(points, axis=0).max())
+    if not size > 0 or len(np.unique(points[:n], axis=0)) < n:
+        return None
+    exponent = int(np.frexp(size)[1])
+    points, size = np.ldexp(points, -exponent), float(np.ldexp(size, -exponent))
+    around = 0.5 * (points.min(axis=0) + points.max(axis=0)) + size * AROUND
     # in rounds of about twice as many points each, so that rows of points take no time that is quadratic
     order = np.argsort(-np.random.default_rng(0).geometric(0.5, len(points)), kind="stable")
     place = np.argsort(order)
     sides = 3 + np.stack([place[:n], np.roll(place[:n], -1)], axis=1)
-    _, added, triangles, across, chains, _ = triangulate_crossing(
-        np.concatenate([around, points[order]]), np.array([1, 2, 3]), sides, FLAT_HEIGHT * size
-    )
-    if len(added) or len(chains) != 2 * n or (chains[1::2] != sides[:, 1]).any():
+    triangles, across = _triangulate_apart(np.concatenate([around, points[order]]), np.array([1, 2, 3]), sides)
+    if not len(triangles):
         return None
     rows, beyond = np.nonzero(across >= 0)
     regions = connected_components(len(triangles), rows, across[rows, beyond])
@@ -494,10 +514,10 @@ def _meets(mesh: Planar, begin: int, done: Floats, b: int, i: int) -> bool:
 
 @compiled
 def _beside(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> int:
-    """Return the neighbour of a at which a segment to b goes on where rounding prevents flips."""
+    """Return the neighbour of a at which a segment to b goes on where rounding prevents flips; −1 at no triangle."""
     x = mesh.x
     t, k, goal = _aim(mesh, begin, done, a, b)
-    if goal >= 0:
+    if goal >= 0 or t < 0:
         return goal
     u, w = mesh.tri[t, k], mesh.tri[t, (k + 1) % 3]
     return u if abs(_turn(x, a, b, u)) <= abs(_turn(x, a, b, w)) else w
@@ -562,12 +582,12 @@ def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: in
 
 @compiled
 def _cross(mesh: Planar, t: int, k: int, a: int, b: int) -> bool:
-    """Add a point where a segment crosses edge k of a triangle, unless there is no room."""
+    """Add a point where a segment crosses edge k of a triangle, unless it does not, or there is no room."""
     x, i = mesh.x, mesh.room[0]
-    if i == len(x):
-        return False
     u, w = mesh.tri[t, k], mesh.tri[t, (k + 1) % 3]
     right, left = _turn(x, a, b, u), _turn(x, a, b, w)
+    if i == len(x) or not right <= 0.0 <= left or right == left:
+        return False
     share = right / (right - left)
     for d in range(2):
         x[i, d] = x[u, d] + share * (x[w, d] - x[u, d])
