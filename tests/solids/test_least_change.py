@@ -270,3 +270,10 @@ def test_bars_that_cross_and_share_corners_are_a_frame_however_they_face(flipped
     }
     exact = {"rel": 0.03} if "lost" in flipped else {"rel": 1e-9}
     assert volume((vertices, faces[kept])) == pytest.approx(len(cells), **exact)
+
+
+def test_confidence_does_not_know_of_what_is_far_away():
+    near = below(ball(), 0.5)
+    alone, beside = sh.complete(near), sh.complete(joined(near, ball(1, center=(100, 0, 0))))
+    confidence = [np.sort(solid.confidence[solid.origins < 0]) for solid in (alone, beside)]
+    np.testing.assert_allclose(*confidence, rtol=1e-5)

@@ -18,7 +18,7 @@ from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..errors import GeometryError, OutsideError, SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
-from ..mesh.components import first_members
+from ..mesh.components import element_components, first_members
 from ..mesh.self_intersections import overlapping_faces
 from ..mesh.triangles import face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
@@ -32,7 +32,8 @@ from .solid import Solid, completed_area, still_true
 from .winding import Windings
 
 TRUST_DISTANCE = 0.05
-"""Confidence in the completion is ½ at this distance from given faces, relative to the shape's diagonal."""
+"""Confidence in the completion is ½ at this distance from given faces, relative to the diagonal of what was given of
+the same connected surface."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ def united(
     kept = np.where(given, (~buried & ~doubled) | keep_overlaps, bounds | ~closes)
     if not kept.any():
         kept[:] = True
-    confidence = _confidence(triangles[kept], given[kept], whole, points)
+    confidence = _confidence(triangles[kept], pieces.origins[kept], whole, points)
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
     bounding = bounds & behind
     if not (uncut and bounding.all()):
@@ -148,20 +149,27 @@ def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds:
     return notes
 
 
-def _confidence(triangles: Floats, given: Bools, whole: TriangleGroup, points: Floats | None) -> NDArray[np.float32]:
-    """(m,) confidence in triangles: 1 for given ones, and less for others, the farther they are from given ones."""
-    confidence = np.ones(len(triangles), dtype=np.float32)
-    if points is None:
-        points = whole.triangles[whole.origins >= 0].reshape(-1, 3)
-    if given.all():
+def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: Floats | None) -> NDArray[np.float32]:
+    """(m,) confidence in parts of triangles: 1 for given ones, and less for others, the farther they are from those."""
+    confidence, given = np.ones(len(triangles), dtype=np.float32), whole.origins >= 0
+    made = np.flatnonzero(~given[owners])
+    corners = whole.triangles[given].reshape(-1, 3) if points is None else points
+    if not len(made):
         return confidence
-    if not len(points):
-        confidence[~given] = 0.5
+    if not len(corners):
+        confidence[made] = 0.5
         return confidence
-    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
-    away = PointTree(points).query(triangles[~given].mean(axis=1))[0]
-    trust = TRUST_DISTANCE * diagonal / np.maximum(TRUST_DISTANCE * diagonal + away, np.finfo(float).tiny)
-    confidence[~given] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
+    surfaces = element_components(whole.ids)
+    n = int(surfaces.max()) + 1
+    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    np.minimum.at(low, surfaces[given], whole.triangles[given].min(axis=1))
+    np.maximum.at(high, surfaces[given], whole.triangles[given].max(axis=1))
+    alone = ~np.isfinite(low).all(axis=1)  # level sets that replace what was given
+    low[alone], high[alone] = corners.min(axis=0), corners.max(axis=0)
+    reach = TRUST_DISTANCE * np.linalg.norm(high - low, axis=1)[surfaces[owners[made]]]
+    away = PointTree(corners).query(triangles[made].mean(axis=1))[0]
+    trust = reach / np.maximum(reach + away, np.finfo(float).tiny)
+    confidence[made] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
     return confidence
 
 
