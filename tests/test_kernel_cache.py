@@ -133,6 +133,21 @@ def test_damaged_files_are_compiled_again(cache, shifted, damage, kind):
     assert value == 7.0 and told[-2:] == ["scaled", "shifted"]
 
 
+def test_processes_that_compile_at_once_share_what_is_kept(cache, shifted, tmp_path):
+    (tmp_path / "scaling.py").write_text(SCALING.format(factor=2.0))
+    (tmp_path / "shifting.py").write_text(SHIFTING.format(shift=1.0))
+    code = "import shifting; print('ready', flush=True); input(); print(shifting.shifted(3.0))"
+    processes = [
+        subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, stdin=-1, stdout=-1, text=True) for _ in range(3)
+    ]
+    assert [process.stdout.readline() for process in processes] == 3 * ["ready\n"]
+    for process in processes:  # all begin to compile now
+        process.stdin.write("\n")
+        process.stdin.flush()
+    assert [process.communicate(timeout=120)[0] for process in processes] == 3 * ["7.0\n"]
+    assert shifted() == (7.0, [])
+
+
 def test_no_folder_can_be_written(tmp_path, shifted, monkeypatch):
     def none(*_, **__):
         raise PermissionError(13, "Permission denied")
