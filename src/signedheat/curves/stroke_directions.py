@@ -91,7 +91,9 @@ class CurvePieces:
             return None
         group, gaps = likely_curves(np.concatenate([places[order[k]][[0, -1]] for k in first]), stroke)
         is_loop = gaps < NEARLY_CLOSED * np.bincount(group, [part.lengths.sum() for part in parts])
-        strokes = Strokes.of(surface, parts, float(domain.triangulation.edge_lengths.mean()), group, is_loop)
+        crossed = surface.triangles.edge_lengths[np.concatenate([part.faces for part in parts])]
+        edge = min(float(domain.triangulation.edge_lengths.mean()), float(crossed.mean()))
+        strokes = Strokes.of(surface, parts, edge, group, is_loop)
         return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, is_piece, strokes)
 
     def curves(self, chosen: Bools) -> Ints:
