@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from shapes.bodies import box
 from shapes.surfaces import disk
 from signedheat.curves.curve_distance import CurvesTaken
 from signedheat.errors import InexactWarning
@@ -200,3 +201,15 @@ def test_gaps_beside_other_curves_are_closed_straight(below, above, gap):
     within = (height > below) & (height < above)
     wrong = (sh.signed_distance(given, ball).values > 0) != within
     assert wrong.sum() <= 0.01 * within.sum()
+
+
+def test_strokes_nearer_to_each_other_than_an_edge_are_two():
+    """Where triangles are made for curves, these say how near copies are, not the larger ones of the mesh."""
+    mesh = box((0, 0, 0), (6, 4, 1))
+    given = []
+    for x, y in ((1, 1), (3, 1), (1, 3)):
+        for radius, way in ((0.4, 1), (0.3, -1)):
+            angle = np.linspace(0, 2 * np.pi, 61)
+            ring = np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle), 0 * angle + 1], axis=1)[::way]
+            given += [mesh.polyline(ring[begin : begin + 18]) for begin in (0, 20, 40)]
+    assert taken(sh.signed_distance(given, mesh)) == ([], [])

@@ -314,7 +314,7 @@ def distance_to_curves(
         if not as_oriented:
             pieces = CurvePieces.of(surface_of(by), flat) if is_default else pieces_for_all(solver.domain, flat)
         if pieces is None or bound_as_given(pieces):
-            exact = distance_by_sides(by, listed, progress)
+            exact = distance_by_sides(by, given, progress)
             if exact is not None:
                 return exact, None
         if as_oriented:
