@@ -201,6 +201,16 @@ class StrayPoints(Note):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class SmallParts(Note):
+    """Connected parts of a mesh that are smaller than asked for, which were left out."""
+
+    small_parts: int
+    small_area: float  # their fraction of the area
+    limits: ClassVar[Mapping[str, float]] = {"small_parts": 0}
+    text: ClassVar[str] = "left out: {0.small_parts:part} smaller than asked for, {0.small_area:%} of the area"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class LeftOut(Note):
     """Faces that a union leaves out of a shape."""
 

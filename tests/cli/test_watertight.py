@@ -1,6 +1,8 @@
 """``signedheat watertight``, as a user meets it."""
 
+import functools
 import json
+import shlex
 
 import numpy as np
 import pytest
@@ -140,6 +142,19 @@ def test_one_label_of_an_image(tmp_path, capsys):
     assert bounds[1] - bounds[0] == pytest.approx([2, 2, 2], abs=0.1)
     assert main(command) == 1
     assert "label" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_small_parts_are_named_and_left_out(tmp_path, capsys):
+    dust = [samples.sphere(1, radius=0.003, center=(1.2, 0.1 * k, 0)) for k in range(4)]
+    mesh = functools.reduce(samples.union, dust, samples.sphere(3))
+    mesh.save(tmp_path / "scan.ply")
+    assert main(["info", str(tmp_path / "scan.ply"), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["small_parts"] == 4 and told["defects"] == []
+    command = shlex.split(told["without_small_parts"])[1:]
+    assert main([*command, "--workers", "1"]) == 0
+    assert sh.read(tmp_path / "scan_whole.ply").n_faces == 1280
 
 
 @pytest.mark.usefixtures("in_this_process")

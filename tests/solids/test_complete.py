@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
-from signedheat.diagnostics import BoundsNothing, LeftOut
+from signedheat.diagnostics import BoundsNothing, LeftOut, SmallParts
 from signedheat.solids.completion import seam_triangles
 from signedheat.solids.overlaps import levels_within
 from signedheat.solids.winding import SUMMED_POINTS, open_edges_of
@@ -646,3 +646,21 @@ def test_levels_of_few_faces_are_those_of_many():
     many = levels_within(triangles, groups, counts, faces)
     np.testing.assert_allclose(many, np.concatenate(few), rtol=0, atol=0.05)  # farther faces are summed together
     np.testing.assert_allclose(many, 0.5 * ways[faces], rtol=0, atol=0.15)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_small_parts_are_left_out_by_their_size(scale):
+    """Whichever way their corners are joined, wherever they are, and whether or not they are closed."""
+    dust = samples.without_patches(samples.sphere(1, radius=0.1, center=(0, 0, 1.2)), 1, 0.1)
+    mesh = samples.union(samples.union(dust, samples.sphere(2)), samples.sphere(1, radius=0.12, center=(5, 0, 0)))
+    mesh = sh.transform(mesh, np.diag([scale, scale, scale, 1.0]))
+    soup = sh.TriangleMesh(mesh.vertices[mesh.faces].reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
+    for shape in (mesh, soup):
+        solid = sh.complete(shape, smallest=0.45 * scale)
+        assert solid.volume == pytest.approx(samples.sphere(2).volume * scale**3, rel=1e-12)
+        assert (np.sort(solid.origins) == np.arange(dust.n_faces, dust.n_faces + 320)).all()
+        note = solid.diagnostics.note(SmallParts)
+        assert note.small_parts == 2 and 0.01 < note.small_area < 0.03
+        assert sh.complete(shape, smallest=1e-3 * scale).volume > solid.volume
+    with pytest.raises(sh.errors.SourceError, match="all parts of the shape are smaller"):
+        sh.complete(mesh, smallest=100 * scale)

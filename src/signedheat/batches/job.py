@@ -286,6 +286,8 @@ class Watertight:
         Contour the whole surface on this grid, as `Solid.surface` does; 256 nodes along the longest side by default.
     seal : float, optional
         Seal openings narrower than this length, and fill what lies behind them, as `complete` does.
+    smallest : float, optional
+        Leave out connected parts smaller than this length, as `complete` does.
     samples : int, optional
         Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
         positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
@@ -321,6 +323,7 @@ class Watertight:
     resolution: int | None = None
     spacing: float | None = None
     seal: float | None = None
+    smallest: float | None = None
     samples: int | None = None
     normalize: bool = False
     label: float | None = None
@@ -335,6 +338,8 @@ class Watertight:
             positive_number(self.tolerance, "tolerance")
         if self.seal is not None:
             positive_number(self.seal, "seal")
+        if self.smallest is not None:
+            positive_number(self.smallest, "smallest")
         for unit in (self.units or "m").split(":"):
             if unit not in METRES:
                 raise SignedHeatError(f"{unit!r} is not a unit", element="units", remedy=f"use {', '.join(METRES)}")
@@ -350,7 +355,7 @@ class Watertight:
             shape = read(path)
         scale = 1.0 if self.units is None else scale_to(path, self.units)
         placed = shape if scale == 1 else transform(shape, np.diag([scale, scale, scale, 1.0]))
-        solid = complete(placed, seal=self.seal)
+        solid = complete(placed, seal=self.seal, smallest=self.smallest)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", InexactWarning)
             surface, way = self._closed_surface(solid)

@@ -26,7 +26,7 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..mesh.surface_points import EDGE, FACE, VERTEX, locate_points
 from ..mesh.triangles import face_areas
 from ..shapes.area_elements import bounds_around
-from ..shapes.inspection import CloudReport, SurfaceReport, TetReport
+from ..shapes.inspection import SMALL_PART, CloudReport, SurfaceReport, TetReport
 from ..solids.mesh_orientation import Orientation
 from ..solids.thickness import Widths
 from ..solids.tiles import BYTES_AT_WORK, BYTES_PER_DENSE_NODE
@@ -70,6 +70,9 @@ def report(file: str, arguments: Namespace) -> Summary:
     if extension(file) == ".obj":
         summary["line_elements"] = len(read_obj_elements(file)[1])
     rows = {name: value for name, value in summary.items() if name != "thickness"}
+    if isinstance(counts, SurfaceReport) and counts.small_parts:
+        summary["without_small_parts"] = advice = without_small_parts(counts, file)
+        rows["small_parts"] = f"{counts.small_parts}, left out by {printable(advice)}"
     summary |= {"defects": [asdict(defect) for defect in defects], "remedy": remedy_of(defects)}
     if found is not None:
         rows["orientation"] = orientation_text(found)
@@ -153,11 +156,7 @@ def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Def
     >>> [(defect.count, defect.remedy) for defect in defects_of(*inspected(broken)[:2], "ball.stl")]
     [(24, 'signedheat fill ball.stl -o ball_filled.stl')]
     """
-    stem, ending = os.path.splitext(file)
-    ending = ending.lower() if ending.lower() in SURFACE_FORMATS else ".stl"
-    if ending == ".stl" and counts.nonmanifold_edges:
-        ending = ".ply"  # STL would join again what touches along these edges
-    name, filled, whole, wall = (shlex.quote(part) for part in (file, *(f"{stem}_{x}{ending}" for x in OUTPUTS)))
+    name, filled, whole, wall = outputs_of(counts, file)
     repair = f"signedheat watertight {name} -o {whole}"
     borders = 0 if found.undecided_area > WHOLE_AREA else counts.borders  # the outlines of sheets are no holes
     kinds = (
@@ -176,6 +175,29 @@ def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Def
         thicken = f"signedheat morph thicken {name} {size:.2g} -o {wall}"
         defects.append(Defect("sheets", found.undecided_parts, text, thicken))
     return [defect for defect in defects if defect.count]
+
+
+def outputs_of(counts: SurfaceReport, file: str) -> list[str]:
+    """Return a file and the files to which commands write it filled, watertight and thickened, quoted for a shell."""
+    stem, ending = os.path.splitext(file)
+    ending = ending.lower() if ending.lower() in SURFACE_FORMATS else ".stl"
+    if ending == ".stl" and counts.nonmanifold_edges:
+        ending = ".ply"  # STL would join again what touches along these edges
+    return [shlex.quote(part) for part in (file, *(f"{stem}_{x}{ending}" for x in OUTPUTS))]
+
+
+def without_small_parts(counts: SurfaceReport, file: str) -> str:
+    """Return the command that leaves out the small parts of a surface.
+
+    Examples
+    --------
+    >>> from signedheat import samples
+    >>> mesh = samples.union(samples.sphere(2), samples.sphere(1, radius=0.002, center=(2, 0, 0)))
+    >>> without_small_parts(inspected(mesh)[0], "scan.ply")
+    'signedheat watertight scan.ply --smallest 0.0346 -o scan_whole.ply'
+    """
+    name, _, whole, _ = outputs_of(counts, file)
+    return f"signedheat watertight {name} --smallest {SMALL_PART * counts.largest_part:.3g} -o {whole}"
 
 
 def remedy_of(defects: Sequence[Defect]) -> str | None:

@@ -44,6 +44,20 @@ def part_sizes(points: Floats, labels: Ints, tails: Ints, heads: Ints) -> Floats
     return np.where(counts > 0, np.minimum((high - low).max(axis=0), np.sqrt(counts / 3.0) * np.exp(logs)), 0.0)
 
 
+def parts_by_place(points: Floats, tails: Ints, heads: Ints) -> tuple[Ints, Floats]:
+    """Return (h,) the connected part of each halfedge, and (p,) the diagonals of the boxes around the parts.
+
+    Vertices at one place connect, also those that only rounding separates.
+    """
+    ids = joined_rims(points, tails, heads, ONE_PLACE)
+    labels = connected_components(len(points), ids[tails], ids[heads])[ids[tails]]
+    names, parts = np.unique(labels, return_inverse=True)
+    low, high = np.full((len(names), 3), np.inf), np.full((len(names), 3), -np.inf)
+    np.minimum.at(low, parts, points[tails])
+    np.maximum.at(high, parts, points[tails])
+    return parts, np.linalg.norm(high - low, axis=1)
+
+
 def tolerances(points: Floats, faces: Ints, units: float) -> Floats:
     """Return (m,) the distance below which places on faces are one: `units` of the size of the part of each face.
 

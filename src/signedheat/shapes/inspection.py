@@ -12,7 +12,7 @@ from ..mesh.components import connected_components
 from ..mesh.edges import HalfedgePairs, following_corners, may_coincide, pair_halfedges
 from ..mesh.tet_shapes import FLAT_TET
 from ..mesh.triangles import areas_of_polygons
-from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
+from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, parts_by_place, same_positions
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
@@ -20,6 +20,9 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..validation import used_bounds
 from .foreign import Shape
+
+SMALL_PART = 0.01
+"""Parts are small if the diagonal of the box around them is less than this share of that of the largest part."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,8 @@ class SurfaceReport:
     n_edges: int  # between two different vertices
     corners_per_face: tuple[int, int]  # the least and greatest number
     components: int  # sets of faces connected through shared vertices
+    small_parts: int  # those whose box has a diagonal below `SMALL_PART` of that of the largest
+    largest_part: float  # the diagonal of the box around the largest
     open_edges: int  # with a single face
     borders: int  # connected sets of open edges
     nonmanifold_edges: int  # with more than two faces
@@ -129,7 +134,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
     if may_coincide(pairs, corners, following):
         first, _ = coincident_faces(corners, offsets)
         duplicates = int(((first >= 0) & (first != np.arange(len(sides)))).sum())
-    lonely = pairs.around == 1
+    lonely, sizes = pairs.around == 1, parts_by_place(mesh.vertices, corners, heads)[1]
     areas, degenerate = areas_of_polygons(mesh.vertices, read_only(corners), read_only(offsets))
     lower, upper = used_bounds(mesh.vertices, corners)
     two = pairs.counts == 2
@@ -138,7 +143,9 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
         n_faces=len(sides),
         n_edges=len(pairs.counts),
         corners_per_face=(int(sides.min()), int(sides.max())),
-        components=_n_components(mesh.n_vertices, corners, heads),
+        components=len(sizes),
+        largest_part=float(sizes.max(initial=0.0)),
+        small_parts=int((sizes < SMALL_PART * sizes.max(initial=0.0)).sum()),
         open_edges=int((pairs.counts == 1).sum()),
         borders=_n_components(mesh.n_vertices, corners[lonely], heads[lonely]),
         nonmanifold_edges=int((pairs.counts > 2).sum()),

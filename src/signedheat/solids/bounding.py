@@ -116,7 +116,9 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
         left = missing_of(other)
         if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
             readings, decided, missing = [inside_out], other, left
-    agreeing = _with_ways(chain, given, chain.agreeing_as_indexed())
+    agreed = chain.agreeing_as_indexed()
+    agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
+    agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
     outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
     by_odd, by_once, around = odd(chain), once(chain), once_around(chain)
     # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong

@@ -142,13 +142,12 @@ class Chain(Frozen):
         even = (np.bincount(edges, one != other) % 2 == 0)[edges] & (one != other)
         return one[even], other[even]
 
-    def agreeing_as_indexed(self) -> Bools:
-        """(k,) which given triangles are reversed once those agree that share an edge, by index, with no third one.
+    def agreeing_as_indexed(self) -> FaceOrientation:
+        """Turn given triangles so that those agree that share an edge, by index, with no third one.
 
         Bodies that touch have vertices of their own where they meet, so that each agrees by itself.
         """
-        areas = np.append(self.areas, 0.0)[self.numbers]
-        return np.asarray(self.reversed != orient_faces(self.given, areas, len(self.positions)).turned)
+        return orient_faces(self.given, np.append(self.areas, 0.0)[self.numbers], len(self.positions))
 
     def outwards_as_indexed(self, reversed: Bools) -> Bools:
         """(k,) which given triangles are reversed once no part, connected by index, encloses a negative volume."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
-from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note
+from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note, SmallParts
 from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
 from ..jobs import Progress, Stopwatch
 from ..linear.threads import one_blas_thread
@@ -23,7 +23,7 @@ from ..mesh.arrangement import SAME_POINT
 from ..mesh.components import numbered
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
-from ..mesh.welding import indexed, tolerances
+from ..mesh.welding import indexed, parts_by_place, tolerances
 from ..parallel import PointTree
 from ..search.face_tree import FaceTree
 from ..search.winding_tree import WindingTree
@@ -125,14 +125,16 @@ class Completion:
     as_oriented: bool = False
     keep_overlaps: bool = False
     seal: float | None = None
+    smallest: float | None = None
 
     def __post_init__(self) -> None:
         for name, choices in (("completion", Completing), ("lids", Lids), ("nested", Nesting)):
             chosen(getattr(self, name), choices, name)
         for name in ("as_oriented", "keep_overlaps"):
             flag(getattr(self, name), name)
-        if self.seal is not None:
-            positive_number(self.seal, "seal")
+        for name in ("seal", "smallest"):
+            if getattr(self, name) is not None:
+                positive_number(getattr(self, name), name)
 
 
 @public_call
@@ -145,6 +147,7 @@ def complete(
     keep_overlaps: bool = False,
     nested: Nesting = "given",
     seal: float | None = None,
+    smallest: float | None = None,
     constraint: Constraint | None = None,
     diffusion: float = 1.0,
     progress: Progress | None = None,
@@ -178,6 +181,8 @@ def complete(
     seal : float, optional
         Seal openings of meshes narrower than this length, to about a sixth of it, and fill what lies behind them: of
         double skins, leaks, bodies within and rubbish, only what is reached from outside is left, as it was given.
+    smallest : float, optional
+        Leave out the connected parts of meshes that fit into a box whose diagonal is shorter than this length.
     constraint, diffusion : Constraint, float
         Options of the signed heat method, where that completes.
     progress : callable, optional
@@ -191,7 +196,7 @@ def complete(
     Raises
     ------
     SourceError
-        If no face has an area, or points have no normals and none are to be fitted.
+        If no face has an area, all parts are too small, or points have no normals and none are to be fitted.
     ConstraintError
         If the constraint denies that distance is zero on all of the shape.
     MemoryLimitError
@@ -218,7 +223,7 @@ def complete(
     >>> solid.distance([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]).round(1).tolist()
     [-1.0, 1.0]
     """
-    options = Completion(completion, lids, nested, as_oriented, keep_overlaps, seal)
+    options = Completion(completion, lids, nested, as_oriented, keep_overlaps, seal, smallest)
     return completed(shape, options, Heat(constraint, diffusion), progress)
 
 
@@ -235,10 +240,14 @@ def completed(
     if isinstance(shape, Solid):
         return shape
     joined = joined_shape(shape)
+    if options.smallest is not None and not isinstance(joined, PointCloud):
+        kept = large_parts(joined.triangulation, options.smallest)
+        return _completed_instead(joined, *kept, replace(options, smallest=None), method, progress)
     if options.completion == "none":
         return _sheet(joined)
     if options.seal is not None and not isinstance(joined, PointCloud):
-        return _sealed(joined, options.seal, replace(options, seal=None, as_oriented=True), method, progress)
+        skin = sealed(joined.triangulation, options.seal)
+        return _completed_instead(joined, *skin, replace(options, seal=None, as_oriented=True), method, progress)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
     parts = "points" if isinstance(joined, PointCloud) else "faces"
     refuse_beyond_memory(
@@ -293,12 +302,33 @@ def _sheet(shape: SurfaceShape) -> Solid:
     return replace(solid, source=shape if isinstance(shape, TriangleMesh) else None)
 
 
-def _sealed(
-    shape: TriangleMesh | PolygonMesh, length: float, options: Completion, method: Heat, progress: Progress | None
+def large_parts(mesh: TriangleMesh, smallest: float) -> tuple[TriangleMesh, Ints, SmallParts]:
+    """Return the connected parts of a mesh that are not small, their (k,) faces, and what was left out."""
+    parts, sizes = parts_by_place(mesh.vertices, mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel())
+    small = sizes < smallest
+    kept = np.flatnonzero(~small[parts[::3]])
+    if not len(kept):
+        raise SourceError(
+            f"all parts of the shape are smaller than {smallest:g}",
+            element="smallest",
+            remedy="choose a smaller length",
+        )
+    left, area = mesh.face_areas[kept].sum(), max(float(mesh.face_areas.sum()), np.finfo(float).tiny)
+    note = SmallParts(int(small.sum()), max(0.0, 1.0 - float(left) / area))
+    return TriangleMesh(mesh.vertices, mesh.faces[kept]), kept, note
+
+
+def _completed_instead(
+    shape: TriangleMesh | PolygonMesh,
+    mesh: TriangleMesh,
+    cut_from: Ints,
+    note: Note,
+    options: Completion,
+    method: Heat,
+    progress: Progress | None,
 ) -> Solid:
-    """Complete what is left of a mesh when its openings are sealed."""
-    skin, cut_from, note = sealed(shape.triangulation, length)
-    solid = completed(skin, options, method, progress)
+    """Complete a mesh in place of a shape, given the triangle of the shape that each of its faces is part of."""
+    solid = completed(mesh, options, method, progress)
     origins = np.where(solid.origins >= 0, owners_of(shape)[cut_from][solid.origins], -1)
     diagnostics = replace(solid.diagnostics, notes=(note, *solid.diagnostics.notes))
     source = shape if isinstance(shape, TriangleMesh) else None
