@@ -91,8 +91,9 @@ class CurvePieces:
             return None
         group, gaps = likely_curves(np.concatenate([places[order[k]][[0, -1]] for k in first]), stroke)
         is_loop = gaps < NEARLY_CLOSED * np.bincount(group, [part.lengths.sum() for part in parts])
-        crossed = surface.triangles.edge_lengths[np.concatenate([part.faces for part in parts])]
-        edge = min(float(domain.triangulation.edge_lengths.mean()), float(crossed.mean()))
+        # the longest sides of triangles that were made for the curves, where these are shorter than edges of the mesh
+        longest = surface.triangles.edge_lengths[np.concatenate([part.faces for part in parts])].max(axis=1)
+        edge = min(float(domain.triangulation.edge_lengths.mean()), float(longest.mean()))
         strokes = Strokes.of(surface, parts, edge, group, is_loop)
         return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, is_piece, strokes)
 
