@@ -277,3 +277,11 @@ def test_confidence_does_not_know_of_what_is_far_away():
     alone, beside = sh.complete(near), sh.complete(joined(near, ball(1, center=(100, 0, 0))))
     confidence = [np.sort(solid.confidence[solid.origins < 0]) for solid in (alone, beside)]
     np.testing.assert_allclose(*confidence, rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3])
+def test_a_frame_with_flipped_triangles_given_twice_a_rounding_apart_is_one_frame(seed):
+    mesh, rng = joined(*[box(*bar) for bar in BARS]), np.random.default_rng(seed)
+    vertices, faces = turned(mesh, rng.random(12 * len(BARS)) < 0.2)
+    shaken = vertices + 1e-8 * rng.normal(size=vertices.shape)
+    assert volume(joined((vertices, faces), (shaken, faces))) == pytest.approx(102, rel=1e-6)

@@ -289,7 +289,7 @@ def _nested(
     tree = WindingTree.of(directed(chain.triangles, counts * outward[pieces]))
     around = tree.levels(places, normals, chain.areas[counted[faces]]) - 0.5 * own
     depth = np.full(n, np.inf)
-    np.minimum.at(depth, probes, np.round(around))
+    np.minimum.at(depth, probes, np.round(around - 0.25))  # a copy a rounding apart, at level ½, is not around
     depth = np.where(closed & np.isfinite(depth), depth, 0.0)
     inner = closed & (depth > 0)
     if not inner.any() or not (depth[owners] <= 0).any():  # of copies a rounding apart, each may lie within the other
