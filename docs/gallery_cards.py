@@ -13,12 +13,15 @@ from PIL import Image, ImageOps
 TRADES = {
     "Repair and printing": (
         "watertight_scan made_solid filled_holes offset_of_a_broken_sphere overlapping_bodies turned_faces print_shell "
-        "hollow_model sections_and_cuts wall_thickness thin_plates open_sheets sharp_contours grow_and_shrink"
+        "hollow_model sections_and_cuts relief_with_a_base wall_thickness thin_plates open_sheets "
+        "sharp_contours grow_and_shrink"
     ),
-    "Distance for learning": "deepsdf_set fit_to_distances booleans_of_fields smooth_blends fine_band",
+    "Distance for learning": (
+        "deepsdf_set clothes_and_roads fit_to_distances booleans_of_fields smooth_blends fine_band"
+    ),
     "Scans and parts": (
-        "deviation_of_a_scan surface_from_points points_without_normals robot_clearance confidence "
-        "shapes_of_other_packages files_in_and_out"
+        "deviation_of_a_scan surface_from_points points_without_normals robot_meshes robot_clearance "
+        "confidence shapes_of_other_packages files_in_and_out"
     ),
     "Drawings and maps": "broken_letter toolpaths rounding_a_drawing floor_plan coastline terrain_from_contours",
     "Masks": "mask_and_back distance_on_voxels grid_of_your_own",

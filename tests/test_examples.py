@@ -13,6 +13,7 @@ NEEDED = {"fit_to_distances": "torch"}
 EXPECTED = {
     "booleans_of_fields": (2 * np.pi / 3 * 0.75**2 * (3 - 0.75), 0.06),
     "broken_letter": (8.5, 0.1),
+    "clothes_and_roads": (1.0, 0.002),
     "coastline": (1.0, 0.08),
     "completion_and_diffusion": (0.705, 0.02),
     "confidence": (1.0, 0.01),
@@ -45,7 +46,9 @@ EXPECTED = {
     "overlapping_bodies": (-np.sqrt(0.75), 0.02),
     "points_without_normals": (2 * np.pi**2 * 0.4**2, 0.12),
     "print_shell": (2 * np.pi * 0.12 - np.pi * 0.2**2 * 0.12, 0.06),
+    "relief_with_a_base": (1.0, 1e-9),
     "robot_clearance": (0.0, 0.01),
+    "robot_meshes": (1.0, 0.02),
     "rounding_a_drawing": (1.0, 0.02),
     "sections_and_cuts": (1.0, 0.01),
     "shapes_of_other_packages": (0.0, 1e-12),

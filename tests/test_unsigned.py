@@ -6,6 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
+from signedheat.cli import main
 from signedheat.search.face_tree import FaceTree
 
 
@@ -69,3 +70,60 @@ def test_distance_to_a_network_of_roads():
 def test_points_are_no_sheet():
     with refused(sh.errors.SourceError, element="completion"):
         sh.complete(sh.PointCloud(samples.sphere(2).vertices), completion="none")
+
+
+def test_lines_in_the_plane():
+    ends = np.random.default_rng(1).uniform(0, 4, (6, 2, 2))
+    lines = [sh.Polyline(line) for line in ends]
+    field = sh.signed_distance(lines, resolution=40, completion="none")
+    away = []
+    for a, b in ends:
+        share = np.clip((field.domain.points - a) @ (b - a) / ((b - a) @ (b - a)), 0, 1)
+        away.append(np.linalg.norm(field.domain.points - a - share[..., None] * (b - a), axis=-1))
+    assert field.values == pytest.approx(np.min(away, axis=0), abs=1e-12)
+    nearest = field.closest([[0.0, 0.0], [2.0, 2.0]])
+    assert not nearest.completed.any() and (nearest.distances >= 0).all()
+    square = sh.Polyline([[0, 0], [1, 0], [1, 1], [0, 1]], closed=True)
+    assert sh.signed_distance(square, resolution=16, completion="none")([[0.5, 0.5]]) == pytest.approx([0.5])
+    with refused(sh.errors.UnsupportedTypeError, element="fill"):
+        sh.signed_distance(lines, completion="none", fill="evenodd")
+    with refused(sh.errors.UnsupportedTypeError, element="source 0"):
+        sh.signed_distance(sh.PointCloud(ends[0]), completion="none")
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_one_word_on_the_command_line(tmp_path, monkeypatch):
+    """The same commands as for signed distance, with the same numbers as in Python."""
+    monkeypatch.chdir(tmp_path)
+    mesh, roads, exact = network()
+    skirt().save("skirt.obj")
+    mesh.save("land.obj")
+    sh.io.write_curves(roads, "roads.json", mesh)
+    line = sh.Polyline([[0.0, 0.0], [2.0, 0.0]])
+    sh.io.write_polylines([line], "line.svg")
+    for command in (
+        "volume skirt.obj --resolution 16 -o cloth.npz",
+        "surface land.obj roads.json -o along.npz",
+        "volume line.svg --resolution 16 -o line.npz",
+        "sample skirt.obj -n 200 -o points.npz",
+        "offset skirt.obj 0.05 --resolution 24 -o shell.stl",
+        "batch skirt.obj -o many --volume --resolution 16 --workers 1",
+    ):
+        assert main([*command.split(), "--unsigned"]) == 0
+    cloth = sh.complete(skirt(), completion="none")
+    for path in ("cloth.npz", "many/skirt.npz"):
+        field = sh.read_field(path)
+        assert field.values == pytest.approx(cloth.distance(field.domain.points), abs=1e-12)
+    assert np.load("along.npz")["values"] == pytest.approx(exact, abs=1e-3)
+    in_plane = sh.read_field("line.npz")
+    assert in_plane.values == pytest.approx(sh.signed_distance(line, in_plane.domain, completion="none").values)
+    assert np.load("points.npz")["distances"].min() >= 0
+    around_rims = 0.5 * np.pi * 0.05**2 * 2 * np.pi * (0.5 + 0.3)  # half cylinders along hem and waist
+    assert sh.complete(sh.read("shell.stl")).volume == pytest.approx(0.1 * skirt().area + around_rims, rel=0.03)
+
+
+@pytest.mark.parametrize("option", ["--plain", "--lids flat", "--as-oriented", "--diffusion 2", "--nested bodies"])
+def test_one_word_stands_alone(option, tmp_path, capsys):
+    command = ["volume", "skirt.obj", "-o", str(tmp_path / "a.npz"), "--unsigned", *option.split()]
+    assert main(command) == 2
+    assert "do not go together" in capsys.readouterr().err

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from .constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from .curves.curve_distance import distance_to_curves
-from .curves.drawings import distance_to_lines
+from .curves.drawings import distance_to_lines, unsigned_distance_to_lines
 from .errors import SourceError, UnsupportedTypeError
 from .fields.field import Field
 from .fields.sharpening import sharpen
@@ -66,6 +66,7 @@ def signed_distance(
     resolution: int = 128,
     spacing: ArrayLike | None = None,
     padding: float | None = None,
+    completion: Completing = "lids",
     constraint: Constraint | None = None,
     diffusion: Diffusion | None = None,
     fill: FillRule = "nonzero",
@@ -107,6 +108,7 @@ def signed_distance(
     source: CurvesAndPoints | ElementList | Sequence[ElementList],
     domain: AnySurface,
     *,
+    completion: Completing = "lids",
     constraint: Free | ZeroSet | Soft | None = None,
     diffusion: float = 1.0,
     intrinsic: bool | Literal["auto"] = "auto",
@@ -170,7 +172,8 @@ def signed_distance(
     band : float, optional
         In space: compute only nodes of the grid whose distance is at most this length, for fine grids.
     completion, lids, nested : str
-        In space: see `complete`. With ``completion="none"``, on surfaces too, distance is unsigned, to what is there.
+        In space: see `complete`. With ``completion="none"``, distance is unsigned and only to what is there, also on
+        surfaces and in the plane: for clothes, and for networks of curves.
     constraint : Free, ZeroSet or Soft, optional
         Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float, optional
@@ -243,8 +246,11 @@ def signed_distance(
     options = {name: given[name] for name, default in DEFAULTS.items() if given[name] is not default}
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
-    if measure is distance_to_curves and options.get("completion") == "none":
-        source, options = _without_sides(source), {name: options[name] for name in options if name != "completion"}
+    if options.get("completion") == "none":
+        if measure is distance_to_lines:
+            measure = unsigned_distance_to_lines
+        elif measure is distance_to_curves:
+            source, options = _without_sides(source), {name: options[name] for name in options if name != "completion"}
     parameters = inspect.signature(measure).parameters.values()
     accepted = [parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY]
     if domain is not None:
@@ -302,6 +308,8 @@ def measured_distance(
             shape = orient(shape)
         return SignedHeatSolver[Any](domain, method.diffusion, progress).distance(shape, method.constraint)
     if isinstance(domain, Grid) and domain.dimension == 2:
+        if options.completion == "none":
+            return unsigned_distance_to_lines(shape, domain, progress=progress)
         return distance_to_lines(shape, domain, **vars(method), as_oriented=options.as_oriented, progress=progress)
     return completed_distance(shape, domain, options, method, progress=progress, **in_band)
 

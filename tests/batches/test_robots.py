@@ -44,10 +44,10 @@ def test_each_mesh_is_listed_once_with_each_scale(robot):
     assert found == [
         ("ball.stl", "arm/ball", (1.0, 1.0, 1.0)),
         ("ball.stl", "arm/ball_x0.5", (0.5, 0.5, 0.5)),
-        ("cup.stl", "arm/cup_x2_1", (2.0, 1.0, 1.0)),
+        ("cup.stl", "arm/cup_x2_1_1", (2.0, 1.0, 1.0)),
     ]
     with_folder = expand([robot.parent])
-    assert {shape.name for shape in with_folder} >= {"arm/ball_x0.5", "arm/cup_x2_1", "meshes/ball", "meshes/cup"}
+    assert {shape.name for shape in with_folder} >= {"arm/ball_x0.5", "arm/cup_x2_1_1", "meshes/ball", "meshes/cup"}
 
 
 @pytest.mark.usefixtures("in_this_process")
@@ -68,13 +68,13 @@ def test_a_field_and_a_closed_mesh_of_each_mesh(robot, tmp_path, capsys):
     ]
     assert main([*command, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["shapes"] == 3
-    cup = sh.read_field(output / "arm" / "cup_x2_1.npz")
+    cup = sh.read_field(output / "arm" / "cup_x2_1_1.npz")
     assert cup([[2.5, 0, 0], [0, 0, 0]]) == pytest.approx([0.5, -1], abs=0.1)
-    assert inspect(sh.read(output / "arm" / "cup_x2_1_+0.stl")).is_closed
+    assert inspect(sh.read(output / "arm" / "cup_x2_1_1_+0.stl")).is_closed
     small = sh.read(output / "arm" / "ball_x0.5_+0.stl")
     assert np.linalg.norm(small.vertices, axis=1).max() == pytest.approx(0.5, abs=0.03)
     assert main(["watertight", str(robot), "-o", str(tmp_path / "closed"), "--workers", "1"]) == 0
-    assert sh.complete(sh.read(tmp_path / "closed" / "arm" / "cup_x2_1.stl")).volume == pytest.approx(
+    assert sh.complete(sh.read(tmp_path / "closed" / "arm" / "cup_x2_1_1.stl")).volume == pytest.approx(
         8 * np.pi / 3, rel=0.05
     )
 

@@ -128,12 +128,21 @@ def test_notebooks_show_it():
     assert "<img" in page and "triangles" in page
 
 
-def test_unsigned_distances_are_those_without_a_sign():
-    """To the same surface, inside too; and to sheets, which have no inside."""
-    solid = sh.complete(samples.without_patches(samples.sphere(3), 3, 0.4))
+def test_unsigned_distances_are_to_what_was_given():
+    """Positive inside, not to lids; and to sheets, which have no inside."""
+    mesh = samples.without_patches(samples.sphere(3), 3, 0.4)
+    solid = sh.complete(mesh)
     points = np.random.default_rng(0).normal(size=(2, 30, 3))
     found = solid.distance(points, signed=False)
-    np.testing.assert_allclose(found, np.abs(solid.distance(points)), rtol=1e-12)
+    sheets = sh.complete(mesh, completion="none").distance(points)
+    np.testing.assert_allclose(found, sheets, rtol=1e-12)
+    nearest = solid.closest(points)
+    assert nearest.completed.any() and (found >= np.abs(nearest.distances) - 1e-12).all()
+    np.testing.assert_allclose(found[~nearest.completed], np.abs(nearest.distances)[~nearest.completed], rtol=1e-12)
     assert found.shape == (2, 30) and solid.distance([0.0, 0.0, 0.0], signed=False) > 0.9
+    whole = sh.complete(samples.sphere(3))
+    np.testing.assert_allclose(whole.distance(points, signed=False), np.abs(whole.distance(points)), rtol=1e-12)
+    cloud = sh.complete(sh.PointCloud(samples.sphere(3).vertices, samples.sphere(3).vertices))
+    np.testing.assert_allclose(cloud.distance(points, signed=False), np.abs(cloud.distance(points)), rtol=1e-12)
     flat = sh.complete(sheet([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]))
     assert flat.distance([0.5, 0.5, -0.25], signed=False) == pytest.approx(0.25)

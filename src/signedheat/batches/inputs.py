@@ -68,7 +68,8 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 def _name_in_robot(robot: Path, root: Path, mesh: Path, scale: tuple[float, float, float]) -> str:
     """Return the name of a mesh of a robot: in a folder of the robot's name, with its scale if it has one."""
     folder = robot.relative_to(root).with_suffix("")
-    factor = "" if scale == UNSCALED else "_x" + "_".join(f"{each:g}" for each in dict.fromkeys(scale))
+    factors = scale[:1] if len({*scale}) == 1 else scale
+    factor = "" if scale == UNSCALED else "_x" + "_".join(f"{each:g}" for each in factors)
     return str(folder / f"{mesh.stem}{factor}{mesh.suffix}")
 
 

@@ -37,7 +37,7 @@ from ..mesh.welding import indexed
 from ..search.face_tree import FaceTree
 from ..shapes.kinds import ShapeLike
 from ..shapes.transforms import transform
-from ..solids.completion import Completion, Lids, complete
+from ..solids.completion import Completing, Completion, Lids, complete
 from ..solids.heat_surfaces import Heat
 from ..solids.kept_faces import kept_surface
 from ..solids.overlaps import Nesting
@@ -110,7 +110,7 @@ class Job:
         The grid around each shape, as for `signed_distance`; by default with room for the offsets.
     band : float, optional
         Half width of a band, outside of which the grid is coarse, as for `signed_distance`.
-    constraint, diffusion, as_oriented, keep_overlaps, lids, nested
+    completion, constraint, diffusion, as_oriented, keep_overlaps, lids, nested
         As for `signed_distance`.
     plain : bool
         Take the method's own field, not distance to the shape, as with the constraints `EachComponent` and
@@ -155,6 +155,7 @@ class Job:
     lids: Lids = "bent"
     nested: Nesting = "given"
     plain: bool = False
+    completion: Completing = "lids"
 
     def __post_init__(self) -> None:
         given = self.offsets if isinstance(self.offsets, Iterable) else [self.offsets]
@@ -177,7 +178,7 @@ class Job:
             cause = f"a plain field has no distances to the shape, as {result} would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
         elif plain and replace(self._completion, as_oriented=False) != Completion():
-            cause = "a plain field has no solid, as lids, nested and keep_overlaps would need"
+            cause = "a plain field has no solid, as completion, lids, nested and keep_overlaps would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
         elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
             cause, remedy = f"a band cannot be written as {self.volume}", f"use {' or '.join(sorted(BAND_FORMATS))}"
@@ -193,7 +194,7 @@ class Job:
 
     @property
     def _completion(self) -> Completion:
-        return Completion("lids", self.lids, self.nested, self.as_oriented, self.keep_overlaps)
+        return Completion(self.completion, self.lids, self.nested, self.as_oriented, self.keep_overlaps)
 
     @property
     def _measures(self) -> bool:

@@ -8,7 +8,7 @@ import tempfile
 from argparse import Namespace
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import signedheat as sh
 
@@ -288,6 +288,7 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
         sampling = sh.batches.Sampling(n=arguments.sample, widths=tuple(arguments.widths), **named)
     same = ("info", "padding", "band", "diffusion", "as_oriented", "keep_overlaps", "lids", "nested", "plain")
     spacing = None if arguments.spacing is None else tuple(arguments.spacing)
+    completing: Literal["none", "lids"] = "none" if arguments.unsigned else "lids"
     return sh.batches.Job(
         volume=f".{arguments.volume}" if arguments.volume else None,
         offsets=tuple(arguments.offset),
@@ -296,5 +297,6 @@ def job_of(arguments: Namespace) -> sh.batches.Job:
         resolution=arguments.resolution or sh.batches.Job.resolution,
         spacing=spacing[0] if spacing is not None and len(spacing) == 1 else spacing,
         constraint=shapes.constraint_of(arguments.constraint),
+        completion=completing,
         **{name: getattr(arguments, name) for name in same},
     )

@@ -14,6 +14,7 @@ from .late_imports import diagnostics, numpy
 from .late_imports import operands as shapes
 from .late_imports import surface_discretization as discretization
 from .options import (
+    UNSIGNED_OPTION,
     UP,
     WITHOUT_COMPLETION,
     Option,
@@ -86,6 +87,7 @@ def check_curves(arguments: Namespace) -> None:
     "Signed distance on a mesh, a point cloud or the boundary of a set of voxels to curves, broken or not, and to "
     "points on it.",
     *about_curves("field: .ply .vtp .obj .npz"),
+    UNSIGNED_OPTION,
     option(
         "--contours",
         type=whole_number(1, 1000),
@@ -210,7 +212,9 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
     intrinsic: Literal[True, "auto"] = True if arguments.intrinsic else "auto"
     field: sh.Field[Any]
     with shapes.prefix_errors(arguments.curves), ProgressBar(is_quiet(arguments)) as progress:
-        if arguments.plain or not isinstance(
+        if arguments.unsigned:
+            field = sh.signed_distance(sources, domain, completion="none", intrinsic=intrinsic, progress=progress)
+        elif arguments.plain or not isinstance(
             constraint, sh.constraints.Free | sh.constraints.ZeroSet | sh.constraints.Soft
         ):
             field = sh.SignedHeatSolver(domain, arguments.diffusion, progress, intrinsic).distance(sources, constraint)

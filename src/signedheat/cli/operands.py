@@ -27,7 +27,7 @@ from ..io.key_figures import describe as describe
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
 from ..memory import refuse_beyond_memory
-from ..solids.completion import Completion, completed
+from ..solids.completion import Completing, Completion, completed
 from ..solids.heat_surfaces import Heat
 from ..tets.tet_discretization import memory_estimate
 from .options import IMAGES, METHOD, REPAIR, is_given, is_planar, is_quiet
@@ -206,7 +206,8 @@ def measured(
 def method_of(arguments: Namespace) -> tuple[Completion, Heat]:
     """Return the options of a command for completing shapes, and for the method."""
     names = ("lids", "nested", "as_oriented", "keep_overlaps")
-    completion = Completion(**{name: getattr(arguments, name) for name in names})
+    completing: Completing = "none" if arguments.unsigned else "lids"
+    completion = Completion(completing, **{name: getattr(arguments, name) for name in names})
     return completion, Heat(constraint_of(arguments.constraint), arguments.diffusion)
 
 

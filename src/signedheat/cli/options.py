@@ -397,9 +397,15 @@ REPAIR = group(
         help="closed bodies inside others are oriented as given, cavities as in slicers, or bodies",
     ),
 )
+UNSIGNED_OPTION = option(
+    "--unsigned",
+    action="store_true",
+    help="unsigned distance to what is there, with nothing completed: to clothes, other sheets, and lines",
+)
 COMPLETION_STEPS = group(
     REPAIR.title,
     *REPAIR.options,
+    UNSIGNED_OPTION,
     option("--plain", action="store_true", help="the method's own field, not measured to the shape itself"),
 )
 METHOD = group(
@@ -500,6 +506,17 @@ EXCLUDED = {
     "--scheduler": ("--workers",),
     "--tets": ("--spacing", "--origin", "--shape", "--band", "--label"),
     "--every-piece": WITHOUT_COMPLETION,
+    "--unsigned": (
+        "--plain",
+        "--constraint",
+        "--diffusion",
+        "--as-oriented",
+        "--every-piece",
+        "--keep-overlaps",
+        "--lids",
+        "--nested",
+        THICKEN,
+    ),
 }
 """Options that contradict others, which may be named with the beginning of a value, as for `is_given`."""
 WITHOUT_SOLIDS = {

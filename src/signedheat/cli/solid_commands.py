@@ -30,6 +30,7 @@ from .options import (
     SURFACES,
     TILES,
     UNITS_OPTION,
+    UNSIGNED_OPTION,
     Command,
     Summary,
     command,
@@ -426,7 +427,7 @@ def cut(arguments: Namespace) -> Summary:
     shape_option(),
     output("samples: .npz"),
     option("-n", "--samples", type=whole_number(1), default=250_000, metavar="N", help="points (250000)"),
-    *(SAMPLING, PLACE, REPAIR, METHOD, format_option("npz")),
+    *(SAMPLING, PLACE, REPAIR, UNSIGNED_OPTION, METHOD, format_option("npz")),
     usage="SHAPE -o OUT.npz [options]",
 )
 def sample(arguments: Namespace) -> Summary:

@@ -153,7 +153,8 @@ def distance_to_pieces(
     if share > MOST_LEFT_OUT and not reason:
         reason = (
             f"{share:.0%} of the length of the curves was left out, as it bounds nothing with the others: "
-            f"{named(numbers[left_out])}. Draw what is missing; every_piece=True takes all curves"
+            f"{named(numbers[left_out])}. Draw what is missing; every_piece=True takes all curves, and "
+            'completion="none" measures unsigned distance to all, as to roads with junctions'
         )
     if len(loops) and not reason:
         reason = (

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, Note
-from ..errors import ConstraintError
+from ..errors import ConstraintError, UnsupportedTypeError
 from ..fields.field import Field
 from ..fields.solid_queries import Closest
 from ..grids.grid import RESOLUTION, Grid
@@ -104,6 +104,30 @@ def distance_to_lines(
     drawing = Drawing.completed(segments_of_lines([line for line in listed if isinstance(line, Polyline)]), phi)
     diagnostics = replace(phi.diagnostics, notes=(*phi.diagnostics.notes, *notes))
     return _field_of(drawing, domain, diagnostics, progress)
+
+
+def unsigned_distance_to_lines(
+    lines: Sources,
+    domain: Grid | None = None,
+    *,
+    resolution: int = 128,
+    spacing: ArrayLike | None = None,
+    padding: float | None = None,
+    completion: Literal["none"] = "none",
+    progress: Progress | None = None,
+) -> Field[Grid]:
+    """Unsigned distance to polylines in the plane, with nothing completed: see `signed_distance`, which calls this."""
+    listed: list[Any] = as_list(lines)
+    for number, line in enumerate(listed):
+        if not isinstance(line, Polyline):
+            raise UnsupportedTypeError(
+                f"unsigned distance in the plane is to polylines, not to a {type(line).__name__}",
+                remedy="leave out completion",
+                element=f"source {number}",
+            )
+    if domain is None:
+        domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
+    return _field_of(Drawing(segments_of_lines(listed), has_sides=False), domain, Diagnostics(), progress)
 
 
 def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> Field[Grid]:
@@ -213,6 +237,7 @@ class Drawing(Frozen):
     completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
     # decides the side at the completion and away from lines. Without it, lines are outlines of what is inside
     phi: Field[Grid[Literal[2]]] | None = None
+    has_sides: bool = True  # whether distance is negative on one side of lines
 
     @classmethod
     def completed(cls, lines: Floats, phi: Field[Grid[Literal[2]]]) -> Drawing:
@@ -282,6 +307,8 @@ class Drawing(Frozen):
         """Return the signed distances of (n, 2) points, the nearest places, and the segments on which these lie."""
         found = self._tree.search(_in_space(points))
         nearest, places = self._tree.features.ids[found.faces], found.places[:, :2]
+        if not self.has_sides:
+            return found.distances, places, nearest
         on_line = nearest < len(self.lines)
         sides = np.ones(len(points)) if self.phi is None else np.where(self.phi.interpolate(points) < 0, -1.0, 1.0)
         if self.phi is not None:

@@ -131,6 +131,12 @@ class Solid(Displayed, Represented, Frozen):
         """Search tree over the triangles."""
         return FaceTree.of(self.features)
 
+    @cached_property
+    def _given_tree(self) -> FaceTree:
+        """Search tree over the triangles that are parts of given faces, or over all if none are."""
+        given = self.origins >= 0
+        return self.tree if given.all() or not given.any() else FaceTree.of_triangles(self.triangles[given])
+
     @property
     def bounds(self) -> Floats:
         """(2, 3) lower and upper corner of the box around all triangles."""
@@ -180,15 +186,16 @@ class Solid(Displayed, Represented, Frozen):
     def distance(self, points: ArrayLike, *, signed: bool = True) -> Floats:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
-        Unsigned distances are to the same surface, but positive inside, too: for sheets, for clearances, and for
-        networks that learn surfaces with a boundary.
+        Unsigned distance needs no inside, and is measured only to faces that were given, not to those that complete
+        them: for clothes and other open surfaces, and for networks that learn these. If no face was given, as in a
+        shape of points, it is measured to the completed surface.
 
         Parameters
         ----------
         points : (..., 3) float
             Positions, in the units of the shape.
         signed : bool
-            Whether distances inside are negative.
+            Whether distances inside are negative, and to the closed surface.
 
         Returns
         -------
@@ -200,6 +207,11 @@ class Solid(Displayed, Represented, Frozen):
         GeometryError
             If a point is not finite.
 
+        See Also
+        --------
+        Solid.closest : Nearest places, gradients and confidence, too.
+        complete : With ``completion="none"``, nothing is completed in the first place.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -207,9 +219,10 @@ class Solid(Displayed, Represented, Frozen):
         array([-0.5,  1. ])
         """
         is_signed = flag(signed, "signed")
+        tree = self.tree if is_signed else self._given_tree
 
         def measured(chunk: Floats) -> tuple[Floats]:
-            nearest = self.tree.search(chunk)
+            nearest = tree.search(chunk)
             inside = is_signed and self.windings.inside_near(chunk, nearest)
             return (np.where(inside, -nearest.distances, nearest.distances),)
 

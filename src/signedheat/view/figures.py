@@ -119,7 +119,8 @@ def add_color_bar(
 ) -> None:
     """Add a colour bar that spans the isolines, with round numbers on both sides of zero."""
     bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)
-    bar.set_label(f"signed distance, a line every {step:g}")
+    kind = "signed distance" if not len(isolines) or isolines[0] < 0 else "distance"
+    bar.set_label(f"{kind}, a line every {step:g}")
     if len(isolines):
         apart = round_step((isolines[-1] - isolines[0]) / 7)  # about seven labels
         ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
