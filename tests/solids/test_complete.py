@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
-from signedheat.diagnostics import BoundsNothing, LeftOut, SmallParts
+from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, SmallParts
 from signedheat.solids.completion import seam_triangles
 from signedheat.solids.overlaps import levels_within
 from signedheat.solids.winding import SUMMED_POINTS, open_edges_of
@@ -251,6 +251,27 @@ def test_zigzag_rims_of_a_bowl_close_to_the_same_lip_however_finely_faces_are_cu
     mesh = sh.TriangleMesh(*joined((outer.vertices, kept), (0.9 * outer.vertices, inner)))
     solids = sh.complete(mesh), sh.complete(finer(mesh.vertices, mesh.faces))
     np.testing.assert_allclose(volume(solids[1]), volume(solids[0]), rtol=0.01)
+
+
+@pytest.mark.parametrize("overlap", [0.1, 0.6])
+def test_nothing_is_made_where_half_shells_overlap(overlap):
+    ball = samples.sphere(4)
+    heights = ball.vertices[ball.faces].mean(axis=1)[:, 2]
+    other = ball.vertices @ Rotation.from_rotvec([0.0, 0.0, 0.3]).as_matrix()
+    halves = joined((ball.vertices, ball.faces[heights > -overlap / 2]), (other, ball.faces[heights < overlap / 2]))
+    solid = sh.complete(halves)
+    assert all(note.completed_share < 0.01 for note in solid.diagnostics.notes if isinstance(note, CompletedArea))
+    assert volume(solid) == pytest.approx(volume(sh.complete(ball)), rel=1e-3)
+
+
+@pytest.mark.parametrize("height", [-0.3, -0.1, 0.0, 0.1])
+def test_half_a_ring_stays_a_ring(height):
+    ring = samples.torus(2.0, 1.0, 48, 24)
+    kept = ring.vertices[ring.faces].mean(axis=1)[:, 2] > height
+    solid = sh.complete(sh.TriangleMesh(ring.vertices, ring.faces[kept]))
+    above, _ = sh.complete(ring).cut([0.0, 0.0, height], [0.0, 0.0, 1.0])
+    assert volume(solid) == pytest.approx(above.volume, rel=0.1)
+    assert not solid.inside([[0.0, 0.0, height], [0.0, 0.0, 0.5]]).any()
 
 
 @pytest.mark.parametrize(("inner", "height"), [(0.6, 0.97), (0.95, 0.8)])

@@ -23,6 +23,7 @@ from ..mesh.edges import EdgeTable, edge_keys, edge_table
 from ..mesh.triangles import area_vectors, face_areas, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from ..parallel import PointTree
+from ..search.face_tree import FaceTree
 from . import lids, walls
 from .lids import Frame, Lid, frame_of, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges, turning
@@ -42,6 +43,8 @@ HALF_BENDING_DEPTH = 0.03
 BEND_RATIO = 0.35
 """Ratio between how far a surface bends and how far it must bend to close its opening. A lid does not bend below this
 ratio, and is clamped above twice this ratio. On a ball the ratio is 1."""
+COVERED_DISTANCE = 0.25
+"""Faces run along a bent lid that are nearer to it than this, relative to its distance from the flat one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -503,6 +506,24 @@ def _spanned(
         ends = surface.patches[behind[rim.edges_at(flat.places)]]
         normals, curvatures, held = continuation(flat, near, ends, width)
         plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
+        if plate is not None and _is_covered(surface, plate, flat):
+            plate, bends = None, False
     if bends and plate is None and (lid := _of_flat_faces(corners, surface.normals[behind], True)):
         return lid
     return lids.draped(corners, rim.starts, frame, plate or flat)
+
+
+def _is_covered(surface: _Surface, bent: Lid, flat: Lid) -> bool:
+    """Whether faces run along most of a bent lid, as of another half shell: nothing is missing where it bends."""
+    lid = bent.vertices[bent.faces]
+    centres, areas = lid.mean(axis=1), face_areas(lid)
+    heights = np.linalg.norm(centres - flat.vertices[flat.faces].mean(axis=1), axis=1)
+    low, high = centres.min(axis=0), centres.max(axis=0)
+    near = surface.tree.meeting(np.stack([low, high, high])[None], COVERED_DISTANCE * float(heights.max()))[1]
+    if not len(near):
+        return False
+    tree = FaceTree.of_triangles(surface.triangles[near])
+    faces, squares = tree.nearest(centres)
+    same_way = (unit(area_vectors(lid)) * surface.normals[near[tree.features.ids[faces]]]).sum(axis=1) > 0
+    covered = same_way & (np.sqrt(squares) < COVERED_DISTANCE * heights)
+    return bool(areas @ covered > 0.5 * areas.sum())

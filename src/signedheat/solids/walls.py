@@ -159,7 +159,10 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
             lids = float(np.linalg.norm(larger.opening) + np.linalg.norm(smaller.opening))
             if lids > LARGE_OPENING * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
                 (area, onward), (again, back) = _strip_areas(larger, smaller), _strip_areas(smaller, larger)
-                if area + again <= 2 * lids * (NARROW + (1 - NARROW) * (onward + back) / max(area + again, 1e-300)):
+                straight = (onward + back) / max(area + again, 1e-300)
+                one = len(np.unique(np.concatenate([larger.parts, smaller.parts]))) == 1
+                # rims of one part around each other, as of half a ring, have lids that would fill its hole
+                if area + again <= 2 * lids * (1 + straight if one else NARROW + (1 - NARROW) * straight):
                     widths.append(((area + again) / lids, i, j))
     best: list[tuple[int, int]] = []
     paired: set[int] = set()
