@@ -7,7 +7,8 @@ if it is taken for a sheet though it bounds, the other way round, or if it faces
 area that is wrong in each scene, and, for each number, the scenes where that changes by more than a hundredth. Of
 shares above a half, twice is half of the way to one. The number that decides between lids and heat is swept over the
 volume that shapes enclose, that of seams of surfaces over seams that were rounded, and slits; those within which
-points are one over boxes that touch.
+points are one over boxes that touch; those of seals over bodies with double skins, leaks and bodies within; the size
+of parts that `signedheat info` calls small over bodies with crumbs, and with screws, which are none.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from signedheat import TriangleMesh, complete, orientation, samples
 from signedheat.mesh import welding
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
-from signedheat.solids import bounding, completion, gauss, overlaps, regions
+from signedheat.shapes import inspection
+from signedheat.solids import bounding, completion, gauss, overlaps, regions, sealing
 
 MODULES = (bounding, gauss, overlaps)
 NUMBERS = (
@@ -305,6 +307,90 @@ def parted(seeds: int, apart: bool = False) -> dict[str, float]:
     return result
 
 
+def reversed_faces(mesh: TriangleMesh) -> TriangleMesh:
+    return TriangleMesh(mesh.vertices, mesh.faces[:, ::-1])
+
+
+def leaky(rng: Random, mesh: TriangleMesh, radius: float, n: int = 12) -> TriangleMesh:
+    """A mesh without the faces around some of its points."""
+    centres = mesh.vertices[mesh.faces].mean(axis=1)
+    leaks = centres[rng.integers(len(centres), size=n)]
+    return TriangleMesh(
+        mesh.vertices, mesh.faces[(np.linalg.norm(centres[:, None] - leaks, axis=2) > radius).all(axis=1)]
+    )
+
+
+def filled_by_seals(seeds: int) -> dict[str, float]:
+    """Mean error of the volume that is filled by seals of 0.25, of bodies about 2 wide."""
+    box_of = {size: sides((size, size, size), (), 3 * (-size / 2,)) for size in (2.0, 1.9)}
+    whole = {
+        "ball": (samples.sphere(4), samples.sphere(4, radius=0.94)),
+        "torus": (
+            samples.torus(1.0, 0.5, n_around=96, n_across=48),
+            samples.torus(1.0, 0.45, n_around=96, n_across=48),
+        ),
+        "box": (box_of[2.0], box_of[1.9]),
+    }
+    corner = samples.union(sides((2, 1, 1)), sides((0.6, 0.5, 1.5), (), (0.4, 0.25, 0.5)))
+    result = {}
+    for name, (outer, inner) in whole.items():
+        volume = complete(outer).volume
+        given = {
+            "two skins": lambda _, outer=outer, inner=inner: samples.union(outer, reversed_faces(inner)),
+            "leaks of 0.08": lambda rng, outer=outer, inner=inner: leaky(rng, samples.union(outer, inner), 0.04),
+            "leaks of 0.16": lambda rng, outer=outer, inner=inner: leaky(rng, samples.union(outer, inner), 0.08),
+            "rubbish within": lambda rng, outer=outer: leaky(
+                rng, samples.union(outer, samples.sphere(2, 0.1, (0.9, 0.1, 0.1))), 0.04
+            ),
+        }
+        for kind, make in given.items():
+            volumes = [complete(make(np.random.default_rng(k)), seal=0.25).volume for k in range(seeds)]
+            result[f"{name}, {kind}"] = float(np.mean(np.abs(np.array(volumes) / volume - 1)))
+    result["corner of two boxes"] = abs(complete(corner, seal=0.25).volume / (2 + 0.6 * 0.5) - 1)
+    cup = samples.union(part_of(samples.sphere(4), lambda at: at[:, 2] < 0.6), reversed_faces(
+        part_of(samples.sphere(4, radius=0.9), lambda at: at[:, 2] < 0.6)))  # fmt: skip
+    result["a cup stays open"] = float(complete(cup, seal=0.25).inside([0.0, 0.0, 0.0]))
+    return result
+
+
+def small_parts(seeds: int) -> dict[str, float]:
+    """Mean share of the small parts that are counted wrongly: crumbs of scans, and what belongs to a machine."""
+    crumbs, screws = [], []
+    for seed in range(seeds):
+        rng = np.random.default_rng([seed, 5])
+        around = [samples.sphere(1, radius, rng.normal(size=3)) for radius in rng.uniform(5e-4, 4e-3, 20)]
+        crumbs.append(1 - inspection.inspect(samples.union(samples.sphere(3), *around)).small_parts / 20)
+        around = [sides((size, size, 2 * size), (), tuple(rng.normal(size=3))) for size in rng.uniform(0.02, 0.1, 20)]
+        joined_boxes = [TriangleMesh(*_welded(box)) for box in around]
+        screws.append(inspection.inspect(samples.union(samples.sphere(3), *joined_boxes)).small_parts / 20)
+    return {"crumbs that are not named": float(np.mean(crumbs)), "screws that are": float(np.mean(screws))}
+
+
+def _welded(mesh: TriangleMesh) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Vertices and faces with one vertex at each place."""
+    places, numbers = np.unique(mesh.vertices.round(9), axis=0, return_inverse=True)
+    return places, numbers.reshape(-1)[mesh.faces]
+
+
+def sweep(name: str, value: float, measured: Callable[[int], dict[str, float]], seeds: int) -> None:
+    """Print what changes by more than `CHANGED` with half and twice a number."""
+    usual = measured(seeds)
+    print(f"{name} {value:g}: " + ", ".join(f"{case} {figure:.4f}" for case, figure in usual.items()), flush=True)
+    for changed in changed_to(value):
+        set_everywhere(name, changed)
+        other = measured(seeds)
+        set_everywhere(name, value)
+        moved = [f"{case} {other[case]:.3f}" for case in usual if abs(other[case] - usual[case]) > CHANGED]
+        print(f"{name} {value:g} → {changed:g}: {'; '.join(moved) or 'nothing'}", flush=True)
+
+
+def seals_and_small_parts(seeds: int = 2) -> None:
+    """Sweep the numbers of seals, and that of small parts."""
+    for name in ("CELLS_PER_OPENING", "TOUCHING", "NEARER", "SMALLEST_BALL", "CORNER_DEPTH"):
+        sweep(name, getattr(sealing, name), filled_by_seals, seeds)
+    sweep("SMALL_PART", inspection.SMALL_PART, small_parts, seeds)
+
+
 def main(seeds: int = 2) -> None:
     usual = table(seeds)
     for name, share in usual.items():
@@ -342,6 +428,7 @@ def main(seeds: int = 2) -> None:
     for units in (welding.ONE_PLACE / 4, welding.ONE_PLACE, 4 * welding.ONE_PLACE):
         set_everywhere("ONE_PLACE", units)
         print(f"with sides apart and welding.ONE_PLACE {units:g}: {listed(parted(seeds, apart=True))}", flush=True)
+    seals_and_small_parts(seeds)
 
 
 def listed(shares: dict[str, float]) -> str:

@@ -157,7 +157,7 @@ CALLABLE = [(name, thing) for name, thing in PUBLIC if inspect.isroutine(thing)]
 KNOWN = {name for name, _ in [*PUBLIC, *methods()]}
 
 
-@pytest.mark.parametrize(("name", "thing"), PUBLIC, ids=[name for name, _ in PUBLIC])
+@pytest.mark.parametrize(("name", "thing"), [*PUBLIC, *methods()], ids=[name for name, _ in [*PUBLIC, *methods()]])
 def test_docstrings_say_what_else_to_look_at(name, thing):
     found = re.search(r"^See Also\n-+\n(.*?)(?:\n\n|\Z)", inspect.getdoc(thing) or "", re.M | re.S)
     assert found, f"{name} has no section See Also"

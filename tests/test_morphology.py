@@ -301,7 +301,7 @@ def test_reflex_edges_are_mitred_inside():
 
 
 def test_distances_may_vary():
-    slope = sh.offset(BALL, lambda places: 0.2 + 0.1 * places[:, 2], resolution=24)
+    slope = sh.offset(BALL, lambda points: 0.2 + 0.1 * points[:, 2], resolution=24)
     same = sh.offset(BALL, 0.2 + 0.1 * BALL.vertices[:, 2], resolution=24)
     for made in (slope, same):
         assert_closed_manifold(made)

@@ -43,6 +43,10 @@ class Constraint(Protocol):
         (n,) float
             φ, a length.
 
+        See Also
+        --------
+        SignedHeatSolver.distance : All three steps.
+
         Examples
         --------
         >>> import signedheat as sh

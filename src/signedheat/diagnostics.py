@@ -73,7 +73,7 @@ class Diagnostics(ShortRepr):
     --------
     >>> diagnostics = Diagnostics().noting(TetsTurned(3), SlopeErrors(0.2, 0.1))
     >>> print(diagnostics.note(TetsTurned))
-    tets turned: 3
+    tets flipped: 3
     >>> diagnostics.note(LargeAngles) is None
     True
     """
@@ -101,6 +101,10 @@ class Diagnostics(ShortRepr):
         Note or None
             The note of this type among `notes`.
 
+        See Also
+        --------
+        results.Diagnostics.noting : Add notes.
+
         Examples
         --------
         >>> Diagnostics(notes=(TetsTurned(3),)).note(TetsTurned)
@@ -120,6 +124,10 @@ class Diagnostics(ShortRepr):
         -------
         Diagnostics
             A copy; this one stays as it is.
+
+        See Also
+        --------
+        results.Diagnostics.note : Find a note by its type.
 
         Examples
         --------
@@ -188,7 +196,7 @@ class OrientedPoints(Note):
     normals_fitted: int
     normals_turned: int
     limits: ClassVar[Mapping[str, float]] = {"normals_fitted": 0, "normals_turned": 0}
-    text: ClassVar[str] = "{0.normals_fitted:normal} fitted, {0.normals_turned} turned"
+    text: ClassVar[str] = "{0.normals_fitted:normal} fitted, {0.normals_turned} flipped"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -273,7 +281,7 @@ class TetsTurned(Note):
     """Number of tets given with negative volume, which have been turned."""
 
     tets_turned: int
-    text: ClassVar[str] = "tets turned: {0.tets_turned}"
+    text: ClassVar[str] = "tets flipped: {0.tets_turned}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

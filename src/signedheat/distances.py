@@ -181,7 +181,7 @@ def signed_distance(
     fill : {"nonzero", "evenodd"}
         In the plane: the filling rule of closed outlines, as in SVG.
     as_oriented : bool
-        Turn and fill nothing, and leave no curve out.
+        Flip and fill nothing, and leave no curve out.
     keep_overlaps : bool
         In space: keep surfaces that lie inside other bodies.
     every_piece : bool

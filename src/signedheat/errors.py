@@ -144,6 +144,10 @@ class SignedHeatError(ValueError):
         SignedHeatError
             An error of the same class, with this `path`.
 
+        See Also
+        --------
+        errors.FileFormatError : A file that cannot be read or written.
+
         Examples
         --------
         >>> str(SignedHeatError("no face has an area").at("part.stl"))

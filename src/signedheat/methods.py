@@ -180,6 +180,10 @@ class Method(Protocol):
         SourceError
             If the method is `Convex`, and the field comes without its source.
 
+        See Also
+        --------
+        sharpen : Sharpen a field.
+
         Examples
         --------
         >>> import signedheat as sh

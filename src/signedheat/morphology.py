@@ -327,8 +327,8 @@ def offset(
         A shape, broken or not; completed here unless it is a solid.
     distance : float, (n,) float or callable
         Positive outside, negative inside. An array has a distance for each vertex of a mesh or point of a cloud, and is
-        interpolated linearly; a function maps (n, 3) places on the shape to distances. The grid has room for its values
-        at the vertices and at some thousand places between them.
+        interpolated linearly; a function maps (n, 3) points on the shape to distances. The grid has room for its values
+        at the vertices and at some thousand points between them.
     corners : {"round", "mitre", "sharp"}
         Shape of edges where offset faces move apart: rounded at the distance ("round"), or mitred: the offset planes
         of the faces are extended up to two distances ("mitre", which keeps boxes) or ten ("sharp").
@@ -361,7 +361,7 @@ def offset(
     Examples
     --------
     >>> from signedheat import samples
-    >>> grown = offset(samples.sphere(4), lambda places: 0.2 + 0.1 * places[:, 2], resolution=40)
+    >>> grown = offset(samples.sphere(4), lambda points: 0.2 + 0.1 * points[:, 2], resolution=40)
     >>> grown.bounds[:, 2].round(2).tolist()
     [-1.1, 1.3]
     """
@@ -493,7 +493,7 @@ def thicken(
     faces: ArrayLike | None = None,
     resolution: int | None = None,
 ) -> TriangleMesh:
-    """Make a solid around an open surface, with upright rims and sharp edges, without completing the surface.
+    """Make a solid around an open surface, with upright walls and sharp edges, without completing the surface.
 
     Parameters
     ----------

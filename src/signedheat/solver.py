@@ -59,7 +59,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     Parameters
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
-        Where distance is measured. Vertices on rims of a mesh that coincide, as along seams, are treated as one.
+        Where distance is measured. Boundary vertices of a mesh that coincide, as along seams, are treated as one.
     diffusion : float or Extrapolated, optional
         τ in ``t = τ h²``, h the mean distance between unknowns; the paper's is 1. Larger values close gaps in broken
         sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`.
@@ -137,6 +137,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         SignedHeatSolver
             On the same domain.
 
+        See Also
+        --------
+        SignedHeatSolver.distance : Distance with this solver.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -183,6 +187,12 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             If there is no source, or one does not fit the domain.
         ConstraintError
             If the constraint does not fit the sources.
+
+        See Also
+        --------
+        SignedHeatSolver.distance_many : Several sources at once.
+        signed_distance : Distance that is exact to the source.
+        sharpen : Exact distance to the zero set of a field.
 
         Examples
         --------
@@ -264,6 +274,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         -------
         list of Field
             The result of `distance` for each, up to rounding. Timings are divided equally among the sources.
+
+        See Also
+        --------
+        SignedHeatSolver.distance : One source.
 
         Examples
         --------
@@ -351,7 +365,7 @@ def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any], names: Ints
     if numbers:
         warn_user(
             f"curve {names[numbers[0]]}{' and others have' if len(numbers) > 1 else ' has'} one side only: the surface "
-            "around it has no outside, so that left and right change places somewhere along it. Give it normals, or "
+            "around it has no outside, so that left and right are exchanged somewhere along it. Give it normals, or "
             "make it unoriented",
             InexactWarning,
         )

@@ -24,9 +24,10 @@ torch: Any = lazy_module("torch", "tensors")
 def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Tensor:
     """Compute signed distances of points, negative inside, that PyTorch can differentiate.
 
-    Let q be the place nearest to a point p at distance d, with weights w in a face with corners v. Then d changes by
-    ``∇d · (δp − Σ w δv)``, since q moves along the surface only. If q lies on the completion, d does not depend on
-    the vertices, since the completion is held fixed. Only first derivatives are computed; second ones are zero.
+    Let q be the point of the surface nearest to a point p at distance d, with weights w in a face with corners v. Then
+    d changes by ``∇d · (δp − Σ w δv)``, since q moves along the surface only. If q lies on the completion, d does not
+    depend on the vertices, since the completion is held fixed. Only first derivatives are computed; second ones are
+    zero.
 
     Parameters
     ----------

@@ -108,7 +108,7 @@ def test_turned_pieces_are_told_and_left_with_as_oriented(tmp_path, capsys):
     summary = json.loads(capsys.readouterr().out)
     assert (summary["turned"], summary["left_out"]) == ([1], [])
     assert main(arguments) == 0
-    assert "curves turned: 1, the first of them number 1" in capsys.readouterr().out
+    assert "curves flipped: 1, the first of them number 1" in capsys.readouterr().out
     assert main([*arguments, "--as-oriented", "--json"]) == 0
     assert "turned" not in json.loads(capsys.readouterr().out)
 

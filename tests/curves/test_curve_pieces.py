@@ -43,7 +43,7 @@ def test_turned_pieces_make_no_difference(mesh, pieces):
     phi = sh.signed_distance(given, mesh)
     assert taken(right) == ([], [])
     assert taken(phi) == ([2], [])
-    assert str(phi.diagnostics.note(CurvesTaken)) == "curves turned: 1, the first of them number 2"
+    assert str(phi.diagnostics.note(CurvesTaken)) == "curves flipped: 1, the first of them number 2"
     assert np.abs(phi.values - right.values).max() < 1e-9
     exact = 0.6 - np.linalg.norm(mesh.vertices, axis=1)
     assert np.abs(phi.values - exact).max() < 0.05

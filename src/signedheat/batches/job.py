@@ -218,6 +218,10 @@ class Job:
         FileFormatError
             If one result would replace another.
 
+        See Also
+        --------
+        batches.run : Run a job, which calls this first.
+
         Examples
         --------
         >>> from signedheat.batches.inputs import expand
@@ -299,7 +303,7 @@ class Watertight:
         In an image of labels, take the voxels with this label, in the coordinates of the image.
     units : str, optional
         Unit of all lengths, such as ``"mm"``. Files that state another unit are scaled to it; those that state none
-        are taken to be in it already, or, with ``"inch:mm"``, in inches.
+        are assumed to be in it already, or, with ``"inch:mm"``, in inches.
 
     See Also
     --------

@@ -69,7 +69,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
             action="store_true",
             help="the method's own field, of the curves as they are given, not measured to the curves themselves",
         ),
-        option("--as-oriented", action="store_true", help="turn no curves, and leave none out"),
+        option("--as-oriented", action="store_true", help="flip no curves, and leave none out"),
         option("--every-piece", action="store_true", help="leave out no stroke, even if it belongs to no other"),
     )
 

@@ -347,7 +347,7 @@ UNITS_OPTION = option(
     ".glb and .step do",
 )
 PLACE = group(
-    "place of the shape (by default that of the file, in its units)",
+    "position of the shape (by default that of the file, in its units)",
     UNITS_OPTION,
     option("--transform", nargs="+", metavar="M", help="16 numbers of a matrix by rows, or 12, or a file of them"),
 )
@@ -386,7 +386,7 @@ LIDS_OPTION = option(
     help="patches continue the curvature of the surface, or are flat, as for half models and hulls",
 )
 REPAIR = group(
-    "steps (all taken by default)",
+    "steps (all done by default)",
     option("--as-oriented", action="store_true", help="flip no faces, normals or lines, and leave out no lines"),
     option("--keep-overlaps", action="store_true", help="keep surfaces that lie inside other bodies"),
     LIDS_OPTION,

@@ -161,7 +161,7 @@ def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Def
     borders = 0 if found.undecided_area > WHOLE_AREA else counts.borders  # the outlines of sheets are no holes
     kinds = (
         ("holes", borders, "hole", "to complete", f"signedheat fill {name} -o {filled}"),
-        ("turned_faces", found.turned_faces, "face", "to turn", repair),
+        ("turned_faces", found.turned_faces, "face", "to flip", repair),
         ("duplicate_faces", found.merged_faces, "duplicate face", "to merge", repair),
         ("hidden_parts", found.nested_bodies, "part", "hidden in others, to leave out", repair),
         ("nonmanifold_edges", counts.nonmanifold_edges, "edge", "of three or more faces", repair),
@@ -260,16 +260,16 @@ def orientation_text(found: Orientation) -> str:
     --------
     >>> from signedheat import samples
     >>> orientation_text(inspected(samples.with_flipped_faces(samples.sphere(2), 0.1))[1])
-    '1 part, closed; faces disagree at 89 edges: 33 faces to turn (10.2 % of the area)'
+    '1 part, closed; faces disagree at 89 edges: 33 faces to flip (10.2 % of the area)'
     """
     closed = "closed" if found.closed_parts == found.n_parts else f"{found.closed_parts} closed"
     said = [f"{_count(found.n_parts, 'part')}, {closed}"]
     if found.inconsistent_edges:
         edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
-        said.append(f"faces disagree at {edges}: {faces} to turn ({percent(found.turned_area)} of the area)")
+        said.append(f"faces disagree at {edges}: {faces} to flip ({percent(found.turned_area)} of the area)")
     elif found.turned_parts:
         which = "all" if found.turned_area > WHOLE_AREA else f"{_count(found.turned_parts, 'part')}"
-        said.append(f"{which} facing inwards ({percent(found.turned_area)} of the area to turn)")
+        said.append(f"{which} facing inwards ({percent(found.turned_area)} of the area to flip)")
     elif found.undecided_area < WHOLE_AREA:
         said.append("facing outwards")
     kinds = (

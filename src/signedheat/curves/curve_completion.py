@@ -50,7 +50,7 @@ def close_curves(
 
     On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
     may be smaller than the triangles, and the result follows them where they are there. The mesh is
-    repaired and pieces are flipped and left out as by `signed_distance`.
+    repaired and curves are flipped and left out as by `signed_distance`.
 
     Parameters
     ----------
@@ -61,10 +61,10 @@ def close_curves(
         The surface.
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
-        the length of the pieces, unless the triangles made along them are larger.
+        the length of the curves' segments, unless the triangles made along them are larger.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them. With `EachComponent`
-        and `LevelValues` curves are taken as given.
+        and `LevelValues` curves are used as given.
     as_oriented : bool
         Turn no curve, and leave none out.
     every_piece : bool

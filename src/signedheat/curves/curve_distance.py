@@ -45,9 +45,9 @@ def warn_of_gaps(mesh: object) -> None:
     gaps = np.flatnonzero((nearly != joined) & (joined == np.arange(len(joined))))
     if len(gaps):
         warn_user(
-            f"rims of the surface run along each other, less than {GAP_UNITS * 2.0**-24:.0e} of its size apart, at "
-            f"{len(gaps)} vertices, the first of them number {gaps[0]}: distance goes round the gap. Merge these "
-            "vertices with those beside them if they are one",
+            "boundary edges of the surface run along each other, less than "
+            f"{GAP_UNITS * 2.0**-24:.0e} of its size apart, at {len(gaps)} vertices, the first of them number "
+            f"{gaps[0]}: distance goes round the gap. Merge these vertices with those beside them if they are one",
             InexactWarning,
         )
 
@@ -97,11 +97,11 @@ class CurvesTaken(Note):
     def __str__(self) -> str:
         taken = [
             f"{name}: {len(which)}, the first of them number {which[0]}"
-            for name, which in (("curves turned", self.turned), ("curves left out", self.left_out))
+            for name, which in (("curves flipped", self.turned), ("curves left out", self.left_out))
             if len(which)
         ]
         share = [f"{self.share_left_out:.2g} of the length left out"] if len(self.left_out) else []
-        return "; ".join(taken + share) or "curves are taken as given"
+        return "; ".join(taken + share) or "curves are used as given"
 
 
 def distance_to_pieces(
@@ -130,7 +130,7 @@ def distance_to_pieces(
         if pieces.is_piece.any():
             warn_user(
                 "curves run where faces cannot agree which side of them is left, on a surface with one side or across "
-                "edges of more than two faces: pieces were taken as they are, and which side is which away from them "
+                "edges of more than two faces: curves were used as they are, and which side is which away from them "
                 "is a guess. Leave out faces, or close the curves",
                 InexactWarning,
             )
@@ -230,13 +230,13 @@ def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence
     if decision.bounds_nothing:
         return (
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
-            f"missing, or turn curves that face the wrong way; {as_given}"
+            f"missing, or flip curves that run the wrong way; {as_given}"
         )
     against = numbers[decision.turned_loops()]
     if len(against):
         return (
             f"{named(against)} ran against about as much of the others, and {'were' if len(against) > 1 else 'was'} "
-            f"turned: which of them are right is a guess. {as_given}"
+            f"flipped: which of them are right is a guess. {as_given}"
         )
     if decision.tied:
         return (
@@ -247,7 +247,7 @@ def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence
     if len(doubtful):
         return (
             f"the region depends on {named(doubtful)}, and closing the gaps takes lines more than half as long: that "
-            "is a guess. Remove what belongs to no curve, turn what faces the wrong way, or draw what is missing; "
+            "is a guess. Remove what belongs to no curve, flip what runs the wrong way, or draw what is missing; "
             f"{as_given}"
         )
     strokes = decision.pieces.strokes

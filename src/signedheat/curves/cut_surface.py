@@ -128,6 +128,10 @@ class CutSurface(LinearDomain, Frozen):
         (p, 2) float
             Jump at the two ends of the edge between the faces of each of the `pairs`.
 
+        See Also
+        --------
+        results.CutSurface.cuts : Where it jumps.
+
         Examples
         --------
         >>> mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -148,6 +152,11 @@ class CutSurface(LinearDomain, Frozen):
         -------
         list of Cut
             Empty if the surface is not cut.
+
+        See Also
+        --------
+        piecewise_distance : A field on a cut surface.
+        results.CutSurface.jumps : How much it jumps.
 
         Examples
         --------
@@ -191,6 +200,10 @@ class CutSurface(LinearDomain, Frozen):
         -------
         (n,) float
             One for each vertex of `split_vertices`.
+
+        See Also
+        --------
+        results.CutSurface.jumps : How far the averaged values are apart.
 
         Examples
         --------

@@ -331,17 +331,17 @@ def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurveOrientation(Frozen, ShortRepr):
-    """How the pieces of a broken curve were oriented.
+    """How the parts of a broken curve were oriented.
 
     Attributes
     ----------
     curves : list of Curve and SurfacePoints
-        All that was given, in order, some curves turned.
+        All that was given, in order, some curves flipped.
     turned : (k,) bool
         Which of them were flipped.
     agreement : (k,) float
-        How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious pieces often do.
-        It is 1 for curves and points that are never turned.
+        How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious strokes often do.
+        It is 1 for curves and points that are never flipped.
 
     See Also
     --------
@@ -373,6 +373,11 @@ class CurveOrientation(Frozen, ShortRepr):
         -------
         list of Curve or SurfacePoints
             Those of `curves` with at least this `agreement`.
+
+        See Also
+        --------
+        orientation : How well each curve agrees.
+        orient : The curves, flipped to agree.
 
         Examples
         --------

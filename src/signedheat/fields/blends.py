@@ -26,7 +26,7 @@ def smooth_union(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field
     Returns
     -------
     Field
-        Its sign and zero set are those of the blend. `sharpen` turns it into distance.
+        Its sign and zero set are those of the blend. `sharpen` makes it a distance.
 
     Raises
     ------

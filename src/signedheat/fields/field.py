@@ -189,6 +189,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         (...) float
             Signed distances; NaN where no value is near.
 
+        See Also
+        --------
+        Field.gradient : The direction in which φ grows.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -214,6 +218,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         -------
         (..., d) float
             Gradients; of length about 1, since φ is a distance.
+
+        See Also
+        --------
+        Field.closest : Nearest points, gradients and confidence together.
 
         Examples
         --------
@@ -259,6 +267,11 @@ class Field(Displayed, Frozen, Generic[Domain]):
         SourceError
             If the field has no solid: it was computed otherwise, or read from a file without one.
 
+        See Also
+        --------
+        Field.gradient : The direction of the distance alone.
+        Solid.closest : The same of a solid.
+
         Examples
         --------
         >>> from signedheat import samples, signed_distance
@@ -286,6 +299,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         -------
         (...) float
             From 0 to 1. Outside the domain it is that of the nearest point of it; it is 1 if the field has none.
+
+        See Also
+        --------
+        Solid.closest : Confidence of points without a grid.
 
         Examples
         --------
@@ -385,6 +402,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Field
             This field itself if its domain is one.
 
+        See Also
+        --------
+        Field.save : Write a field.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -433,6 +454,12 @@ class Field(Displayed, Frozen, Generic[Domain]):
         GeometryError
             If the grid has neither 2 nor 3 dimensions, values are infinite, or there is no cell with values.
 
+        See Also
+        --------
+        Field.offset : The same, refused where the domain cuts it off.
+        offset : Offsets with sharp corners, without a grid.
+        contour : A level set of any function or array.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -475,6 +502,11 @@ class Field(Displayed, Frozen, Generic[Domain]):
         OutsideError
             If φ does not take the value, or the offset leaves the grid or the tets although the shape itself does not.
 
+        See Also
+        --------
+        Field.contour : The level set, cut off or not.
+        offset : Offsets with sharp corners, without a grid.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -512,6 +544,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         FileFormatError
             If the file is of another kind, or cannot be written.
 
+        See Also
+        --------
+        Field.contour : The level set itself.
+
         Examples
         --------
         >>> import tempfile
@@ -540,6 +576,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         ------
         MissingPackageError
             If PyVista is not installed.
+
+        See Also
+        --------
+        Field.plot : Show the field.
 
         Examples
         --------
@@ -573,6 +613,11 @@ class Field(Displayed, Frozen, Generic[Domain]):
         MissingPackageError
             If the format needs meshio, and it is not installed.
 
+        See Also
+        --------
+        read_field : Read what was written.
+        Field.save_contour : Write a level set.
+
         Examples
         --------
         >>> import tempfile
@@ -597,6 +642,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
         -------
         Field
             Without diagnostics, source, confidence and solid.
+
+        See Also
+        --------
+        Field.combined_with : A rule for the values of two fields.
 
         Examples
         --------
@@ -628,6 +677,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
             If the fields lie on different domains.
         UnsupportedTypeError
             If these are of different kinds.
+
+        See Also
+        --------
+        morphology.smooth_union : A union with a rounded seam.
 
         Examples
         --------

@@ -14,26 +14,26 @@ from ..errors import counted
 
 @dataclass(frozen=True, eq=False)
 class Closest:
-    """The nearest places on a solid's surface for points, in the shape of the points.
+    """The nearest points on a solid's surface, in arrays of the shape of the query points.
 
     Attributes
     ----------
     distances : (...) float
         Signed distances, negative inside.
     points : (..., 3) float
-        The nearest places.
+        The nearest points.
     faces : (...) int
-        Face of the given shape on which each place lies; −1 on the completion.
+        Face of the given shape on which each point lies; −1 on the completion.
     barycentric : (..., 3) float
         Position in that face, if it is a triangle: the weights of its corners; NaN elsewhere.
     gradients : (..., 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
     confidence : (...) float
-        1 on the given surface; on the completion less, the farther from its rim.
+        1 on the given surface; on the completion less, the farther from its boundary.
 
     See Also
     --------
-    Solid.closest : Nearest places on the surface.
+    Solid.closest : Nearest points on the surface.
 
     Examples
     --------

@@ -62,7 +62,7 @@ def traced_path(triangles: IntrinsicMesh, placed: PlacedSegments, ends: LocatedP
             best, points = length, concatenated([ends[np.array([i])], locate_points(triangles, crossed, weights)])
     if not len(points):
         raise SourceError(
-            f"no way along the surface joins the two places, of which one is in face {ends.faces[0]}: they lie on "
+            f"no path along the surface joins the two points, one of which is in face {ends.faces[0]}: they lie on "
             "different connected components",
             element=f"face {ends.faces[0]}",
         )

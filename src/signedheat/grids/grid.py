@@ -146,6 +146,10 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         GeometryError
             If the box has no extent and there is no padding, or resolution, padding or spacing are out of range.
 
+        See Also
+        --------
+        signed_distance : Distance, by default on such a grid.
+
         Examples
         --------
         >>> Grid.around([[0, 0, 0], [1, 2, 4]], resolution=7, padding=1.0)
@@ -215,6 +219,10 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         (...) bool
             True on the boundary, too.
 
+        See Also
+        --------
+        Grid.around : A grid that contains a shape.
+
         Examples
         --------
         >>> Grid((0, 0), 0.5, (3, 3)).contains([[1.0, 0.2], [1.1, 0.2]])
@@ -237,6 +245,10 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
             If PyVista is not installed.
         GeometryError
             If the grid has other than two or three axes.
+
+        See Also
+        --------
+        Field.to_pyvista : A grid with the values of a field.
 
         Examples
         --------

@@ -94,6 +94,11 @@ class Polyline(Displayed, Frozen):
         GeometryError
             If the mask is not a boolean image, or nothing in it is True.
 
+        See Also
+        --------
+        redistance : Distance to the boundary of a mask.
+        DigitalSurface : Voxels.
+
         Examples
         --------
         >>> [dot] = Polyline.from_mask([[False, False], [False, True]])
@@ -152,6 +157,10 @@ class Polyline(Displayed, Frozen):
         -------
         Polyline
             With the same points from last to first.
+
+        See Also
+        --------
+        orient : Flip curves so that they agree.
 
         Examples
         --------

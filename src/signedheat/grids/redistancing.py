@@ -43,7 +43,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
     Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
     that to the contour of values that are linear between nodes. An array of two opposite values tells only the side of
-    each node: of the contours that separate the two sides, a smooth one is taken.
+    each node: of the contours that separate the two sides, a smooth one is used.
 
     Parameters
     ----------

@@ -86,7 +86,7 @@ class _Drawing:
         rule = style.get("fill-rule") or element.get("fill-rule") or rule
         if kind in CONTAINERS or (kind == "symbol" and is_used):
             if depth and any(name in element.attrib for name in PLACED.get(kind, ())):
-                raise FileFormatError(f"a {kind} in it has coordinates of its own", remedy="turn it into paths first")
+                raise FileFormatError(f"a {kind} in it has coordinates of its own", remedy="convert it to paths first")
             for child in element:
                 yield from self.drawn(child, matrix, depth + 1, is_used, rule)
         elif kind == "use":
@@ -384,13 +384,13 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     ----------
     path : str or path
         ``.svg``: all paths, lines, polylines, polygons, rectangles, circles and ellipses, with their transforms, in
-        user units, 96 of which are an inch. The y axis, which points down in such files, is turned up, so that the left
+        user units, 96 of which are an inch. The y axis, which points down in such files, is flipped, so that the left
         of a path is its left in the drawing. Subpaths without length are left out. Where a file says ``fill-rule:
         evenodd``, closed subpaths become the outlines of what they fill. ``.csv``: x and y on each line, an empty line
         between polylines; a polyline is closed if its last point equals its first. ``.geojson``: lines, and the
         rings of polygons, in the plane of their coordinates. ``.dxf``, by the package ezdxf: lines, polylines, arcs,
-        circles, ellipses, splines and hatches, those of blocks in their places, seen along z; what closes becomes the
-        outlines of what lies within an odd number of them.
+        circles, ellipses, splines and hatches, those of blocks where these are inserted, seen along z. What closes
+        becomes the outlines of what lies within an odd number of them.
 
     Returns
     -------

@@ -212,7 +212,7 @@ def _load_band(path: PathLike) -> Field[Band]:
         coarse = made(Field, made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
         places = arrays["places"]
         if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
-            raise damaged("its blocks have no places", element="places")
+            raise damaged("its blocks have no positions", element="places")
         if len(places) and not ((places >= 0) & (places * BLOCK < grid.shape)).all():
             raise damaged("its blocks lie outside of the grid", element="places")
         blocks = Blocks.of(places, grid.shape)

@@ -45,8 +45,9 @@ class LabelImage(Represented, Frozen):
     """Labels of voxels, and where these are.
 
     An image with zeros and one other label can be given wherever a shape can, and stands for its `boundary` in the
-    world. For others, distance is measured along the axes of the image (`grid`, `surface`), and written back into its
-    place (`save`, `to_world`), which does not change distances, as the axes are at right angles.
+    world. For others, distance is measured along the axes of the image (`grid`, `surface`), and results are written
+    with its position in the world (`save`, `to_world`). That does not change distances, as the axes are at right
+    angles.
 
     Attributes
     ----------
@@ -156,6 +157,11 @@ class LabelImage(Represented, Frozen):
         GeometryError
             If no voxel has it, or it is left out and there are several.
 
+        See Also
+        --------
+        io.LabelImage.to_world : Map the surface to the world.
+        signed_distance : Distance to the surface.
+
         Examples
         --------
         >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
@@ -180,7 +186,7 @@ class LabelImage(Represented, Frozen):
         return DigitalSurface(inside, self.spacing).smooth_surface
 
     def to_world(self, surface: Mesh) -> Mesh:
-        """Map a mesh from the axes of the image to the world. If the map mirrors it, its faces are turned over.
+        """Map a mesh from the axes of the image to the world. If the map mirrors it, its faces are flipped.
 
         Parameters
         ----------
@@ -192,6 +198,10 @@ class LabelImage(Represented, Frozen):
         TriangleMesh or PolygonMesh
             In the world.
 
+        See Also
+        --------
+        io.LabelImage.surface : The surface along the axes of the image.
+
         Examples
         --------
         >>> image = LabelImage(np.pad(np.full((2, 2, 2), 7), 1), axes=2.0 * np.eye(3), origin=np.zeros(3))
@@ -201,7 +211,7 @@ class LabelImage(Represented, Frozen):
         return cast("Mesh", transform(surface, self.matrix))
 
     def save(self, field: Field[Grid], path: PathLike) -> None:
-        """Write a field along the axes of the image into its place in the world.
+        """Write a field along the axes of the image, with its position in the world.
 
         Parameters
         ----------
@@ -215,7 +225,12 @@ class LabelImage(Represented, Frozen):
         Raises
         ------
         FileFormatError
-            If the format has no place for turned axes, or for the space of the image, or the file cannot be written.
+            If the format cannot hold rotated axes or the space of the image, or the file cannot be written.
+
+        See Also
+        --------
+        io.read_labels : Read an image.
+        Field.save : Write a field that belongs to no image.
 
         Examples
         --------
@@ -239,7 +254,7 @@ class LabelImage(Represented, Frozen):
             save_field(replace(field, domain=Grid(first, field.domain.spacing, field.domain.shape), solid=None), path)
 
     def ensure_writable(self, path: PathLike) -> None:
-        """Check before a long computation that a field can be written into the place of the image.
+        """Check before a long computation that a field can be written with the position of the image.
 
         Parameters
         ----------
@@ -249,7 +264,11 @@ class LabelImage(Represented, Frozen):
         Raises
         ------
         FileFormatError
-            If the format has no place for turned axes, or for the space of the image, or the file cannot be written.
+            If the format cannot hold rotated axes or the space of the image, or the file cannot be written.
+
+        See Also
+        --------
+        io.LabelImage.save : Write the field.
 
         Examples
         --------
@@ -286,17 +305,17 @@ class LabelImage(Represented, Frozen):
 
 
 def read_labels(path: PathLike) -> LabelImage:
-    """Read an image of labels, as segmentation makes them, with its place in the world.
+    """Read an image of labels, as segmentation makes them, with its position in the world.
 
     Parameters
     ----------
     path : str or path
-        ``.nrrd``, ``.nii`` or ``.nii.gz`` (with nibabel), ``.vti``, ``.npy``. Axes may be turned and mirrored.
+        ``.nrrd``, ``.nii`` or ``.nii.gz`` (with nibabel), ``.vti``, ``.npy``. Axes may be rotated and mirrored.
 
     Returns
     -------
     LabelImage
-        Labels and place.
+        Labels, and their position in the world.
 
     Raises
     ------

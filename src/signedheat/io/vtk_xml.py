@@ -77,7 +77,7 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
         raise FileFormatError("the image is not in one piece", remedy="write it again as a single .vti file")
     direction = image.get("Direction", "1 0 0 0 1 0 0 0 1")
     if parsed_numbers(direction.split(), "direction").tolist() != np.eye(3).ravel().tolist():
-        raise FileFormatError(f"the axes of the image are turned ({direction})", remedy="resample it along x, y, z")
+        raise FileFormatError(f"the axes of the image are rotated ({direction})", remedy="resample it along x, y, z")
     shape = extent[1::2] - extent[::2] + 1
     n_nodes = math.prod(shape.tolist())
     if shape.min() < 1 or abs(extent).max() >= 2**53:
@@ -134,7 +134,7 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     for piece in pieces:
         table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
         if arrays.count(piece, "NumberOfStrips"):
-            raise FileFormatError("there are triangle strips", remedy="turn them into triangles before saving")
+            raise FileFormatError("there are triangle strips", remedy="convert them to triangles before saving")
         n_own, n_faces = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfPolys")
         xyz = next((element for (tag, _), element in table.items() if tag == "Points"), None)
         offsets = integers(arrays.of(table.get(("Polys", "offsets")), n_faces), "offsets", 0)

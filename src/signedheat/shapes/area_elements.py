@@ -181,7 +181,7 @@ def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
     if left < AREA_ROUNDING:
         raise CancellingNormalsError(
             "the normals of the source cancel each other everywhere, so that nothing separates inside from outside",
-            remedy="remove or turn one of its coinciding sides",
+            remedy="remove or flip one of its coinciding sides",
         )
     outside = max(0.0, 1.0 - inside / total)
     cancelled = max(0.0, 1.0 - left)

@@ -77,6 +77,10 @@ class Displayed:
         MissingPackageError
             If PyVista is not installed.
 
+        See Also
+        --------
+        Solid.plotter : A picture of it, to which more can be added.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -104,6 +108,10 @@ class Displayed:
         MissingPackageError
             If PyVista is not installed (``pip install pyvista``).
 
+        See Also
+        --------
+        Solid.plot : Show it at once.
+
         Examples
         --------
         >>> from signedheat import samples
@@ -112,7 +120,7 @@ class Displayed:
         return windows.plotter_of(self)
 
     def plot(self) -> object:
-        """Show this in a window or a notebook, by PyVista; in notebooks it can be turned if trame is installed.
+        """Show this in a window or a notebook, by PyVista; in notebooks you can rotate it if trame is installed.
 
         Returns
         -------
@@ -123,6 +131,10 @@ class Displayed:
         ------
         MissingPackageError
             If PyVista is not installed (``pip install pyvista``).
+
+        See Also
+        --------
+        Solid.plotter : The same, as a plotter to add to.
 
         Examples
         --------
@@ -234,6 +246,11 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         FileFormatError
             If the format is not one of these, or cannot hold such a shape, or the file cannot be written.
 
+        See Also
+        --------
+        save : Formats, and what each keeps.
+        read : Read a file.
+
         Examples
         --------
         >>> import tempfile
@@ -259,6 +276,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             A shape of the class on which this was called.
 
+        See Also
+        --------
+        as_shape : A shape of any package's object.
+
         Examples
         --------
         >>> import trimesh
@@ -275,6 +296,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         trimesh.Trimesh or trimesh.PointCloud
             Not processed: vertices and faces keep their order.
+
+        See Also
+        --------
+        as_shape : The other way.
 
         Examples
         --------
@@ -302,6 +327,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         TriangleMesh, PolygonMesh or PointCloud
             A shape of the class on which this was called.
+
+        See Also
+        --------
+        as_shape : A shape of any package's object.
 
         Examples
         --------
@@ -336,6 +365,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             A shape of the class on which this was called.
 
+        See Also
+        --------
+        as_shape : A shape of any package's object.
+
         Examples
         --------
         >>> import meshio
@@ -353,6 +386,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         meshio.Mesh
             The normals of points are point data ``nx``, ``ny``, ``nz``.
+
+        See Also
+        --------
+        as_shape : The other way.
 
         Examples
         --------
@@ -390,6 +427,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         TriangleMesh, PolygonMesh or PointCloud
             A shape of the class on which this was called.
 
+        See Also
+        --------
+        as_shape : A shape of any package's object.
+
         Examples
         --------
         >>> import open3d  # doctest: +SKIP
@@ -404,6 +445,10 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         -------
         open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
             In double precision.
+
+        See Also
+        --------
+        as_shape : The other way.
 
         Examples
         --------

@@ -27,7 +27,7 @@ from .kinds import ShapeLike
 def transform(
     shape: TriangleMesh | PolygonMesh | PointCloud | DigitalSurface | TetMesh | ForeignShape, matrix: ArrayLike
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
-    """Move, turn, scale or shear a shape by an affine map.
+    """Move, rotate, scale or shear a shape by an affine map.
 
     What is inside stays inside: the faces of a mirrored shape are flipped. A solid stays a solid, as it was completed.
 

@@ -154,8 +154,8 @@ def complete(
 ) -> Solid:
     """Complete a shape to the solid it represents, broken or not.
 
-    Faces are turned to agree and to face outwards. Parts that bound something are closed by lids: thin plates that
-    continue the surface where it bends towards its rim, and are flat elsewhere. Points, and loose triangles that
+    Faces are flipped to agree and to face outwards. Parts that bound something are closed by lids: thin plates that
+    continue the curvature around the hole, and are flat elsewhere. Points, and loose triangles that
     scatter around a surface, are completed by the signed heat method. Bodies that overlap are united. Sheets bound
     nothing: distance to them is positive on both sides. The result does not depend on where distance is wanted, nor on
     rotation, position and scale.

@@ -55,11 +55,11 @@ class Deviation(Frozen):
     distances : (n,) float
         Distances of its points or vertices, in their units.
     nearest : (n, 3) float
-        The nearest places of the part.
+        The nearest points of the part.
     completed : (n,) bool
-        Whether the nearest places lie on the completion of the nominal part.
+        Whether the nearest points lie on the completion of the nominal part.
     beyond_rim : (n,) bool
-        Whether points lie beyond the rim of an open part, such as a panel or a terrain. Their sign is that of the
+        Whether points lie beyond the boundary of an open part, such as a panel or a terrain. Their sign is that of the
         continued surface.
 
     See Also
@@ -120,6 +120,10 @@ class Deviation(Frozen):
         float
             From 0 to 1.
 
+        See Also
+        --------
+        results.Deviation.worst : The points farthest off.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -142,6 +146,10 @@ class Deviation(Frozen):
         -------
         (k,) float
             Signed distances to the part, positive outside.
+
+        See Also
+        --------
+        results.Deviation.histogram : Counts by deviation.
 
         Examples
         --------
@@ -168,6 +176,11 @@ class Deviation(Frozen):
         limits : (bins + 1,) float
             Limits between the bins, as lengths.
 
+        See Also
+        --------
+        results.Deviation.percentiles : Percentiles.
+        results.Deviation.within : The share within a tolerance.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -183,17 +196,21 @@ class Deviation(Frozen):
         return counts.astype(np.int64), limits
 
     def worst(self, n: int = 10) -> Ints:
-        """Find the places with the largest deviations, each a twentieth of the scan's size from the others.
+        """Find the points with the largest deviations, each a twentieth of the scan's size from the others.
 
         Parameters
         ----------
         n : int
-            Number of places at most.
+            Number of points at most.
 
         Returns
         -------
         (k,) int
             Points or vertices, from the largest absolute deviation on.
+
+        See Also
+        --------
+        results.Deviation.within : The share within a tolerance.
 
         Examples
         --------
@@ -231,12 +248,16 @@ class Deviation(Frozen):
         path : str or path
             ``.ply`` for the scan in colours, blue below the part and orange above; ``.png``, ``.pdf``, ``.svg`` or
             ``.jpg`` for a picture of it with a histogram; ``.csv`` for a line for each point with its position,
-            deviation and nearest place.
+            deviation and nearest point.
 
         Raises
         ------
         FileFormatError
             If the format is unknown, or the file cannot be written.
+
+        See Also
+        --------
+        deviation : Compare a scan with a part.
 
         Examples
         --------
@@ -290,7 +311,7 @@ def deviation(
     --------
     results.Deviation : Deviations of a scan.
     wall_thickness : How thick walls are.
-    Solid.closest : Nearest places on the surface.
+    Solid.closest : Nearest points on the surface.
 
     Examples
     --------

@@ -93,17 +93,17 @@ def fill_holes(
     """Close holes of a mesh, and leave everything else as it is.
 
     Vertices and faces stay in their order, whichever way they face, broken or not. New ones follow, and face as their
-    neighbours do. Every rim of a part that bounds something is a hole. Sheets stay sheets: the longest rim of each is
-    its outline. To make a solid of a broken shape, use `complete`.
+    neighbours do. Every boundary loop of a part that bounds something is a hole. Sheets stay sheets: the longest
+    boundary loop of each is its outline. To make a solid of a broken shape, use `complete`.
 
     Parameters
     ----------
     mesh : TriangleMesh or PolygonMesh
         Any mesh.
     largest : float, optional
-        Length of the longest rim that is closed, in the units of the mesh.
+        Length of the longest boundary loop that is closed, in the units of the mesh.
     rims : int or sequence of int, optional
-        Close rims through these vertices only, outlines of sheets among them.
+        Close only boundary loops through these vertices, including outlines of sheets.
     lids : {"bent", "flat"}
         Whether lids continue the bend of the surface, or are flat, as in `complete`.
 

@@ -145,7 +145,7 @@ def contour(
     f : callable, or (nx, ny, nz) float
         A function that returns one number for each of (n, 3) points; or values at the nodes of a grid.
     bounds : (2, 3) float
-        Lower and upper corner of the box; of an array, the places of its first and of its last node.
+        Lower and upper corner of the box; of an array, the positions of its first and of its last node.
     spacing : float or (3,) float, optional
         Size of the cells in which a function is sampled. Arrays have their own.
     level : float
@@ -163,7 +163,7 @@ def contour(
     TriangleMesh
         Of functions with flat sides, edges and corners are exact to rounding where cells resolve them; those that bend
         are off by the square of the cells. Edges of arrays are exact where gradients are given; with differences they
-        are off by up to a quarter of a cell, and corners and rims of holes by more.
+        are off by up to a quarter of a cell, and corners and edges of holes by more.
 
     Raises
     ------

@@ -41,7 +41,7 @@ class Orientation(Frozen, ShortRepr):
         Which of them were flipped.
     parts : (k,) int
         Piece of each face, connected across edges of two faces or closed as given; −1 for faces on fewer
-        than three places, and inner walls.
+        than three distinct points, and inner walls.
     undecided : (k,) bool
         Faces of sheets, which bound nothing: they agree with their neighbours.
     inner : (k,) bool
@@ -123,10 +123,10 @@ def orientation(
 ) -> Orientation | CurveOrientation:
     """Orient a mesh, or curves on a surface, and say which faces or curves were flipped, merged and left.
 
-    Vertices at one place, to roundoff, count as one, and so do faces on the same corners. What is closed as
-    given stays as it is, or turns as a whole to face outwards. Other faces are made to agree across edges of two faces,
-    walls between closed cells are left out (`inner_walls`), and Gauss's formula decides which way the resulting pieces
-    face and which of them bound nothing (`signedheat.solids.bounding`).
+    Vertices that coincide up to rounding count as one, and so do faces on the same corners. What is closed as given
+    stays as it is, or is flipped as a whole to face outwards. Other faces are made to agree across edges of two faces.
+    Walls between closed cells are left out (`inner_walls`). Gauss's formula decides which way the resulting patches
+    face, and which of them bound nothing.
 
     Curves are flipped so that they bound a region together, the one with the shortest boundary where they leave gaps.
 
@@ -274,7 +274,7 @@ def orient(
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh or a sequence of Curve and SurfacePoints
-        Any mesh, or the pieces of broken curves.
+        Any mesh, or broken curves.
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
         The surface that the curves lie on.
 

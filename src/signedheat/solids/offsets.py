@@ -134,7 +134,7 @@ def checked_reach(reach: Reach) -> Reach:
         if values.shape != (len(places),) or not np.isfinite(values).all():
             raise SignedHeatError(
                 f"the distance has shape {values.shape} at {counted(len(places), 'place')}, or is not finite",
-                remedy="return a finite number for each of (n, 3) places",
+                remedy="return a finite number for each of (n, 3) points",
                 element="distance",
             )
         return values

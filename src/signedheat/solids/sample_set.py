@@ -33,11 +33,11 @@ class Samples:
     near : (n,) bool
         Whether a point was sampled near the surface.
     completed : (n,) bool
-        Whether the nearest place lies on the completion.
+        Whether the nearest point lies on the completion.
     center : (3,) float
         Centre of the box around the surface.
     radius : float
-        Distance from the centre to the farthest place of the surface.
+        Distance from the centre to the farthest point of the surface.
 
     See Also
     --------
@@ -48,10 +48,10 @@ class Samples:
     --------
     >>> import numpy as np
     >>> from signedheat import sample_distances, samples, signed_distance
-    >>> taken = sample_distances(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
-    >>> taken
+    >>> drawn = sample_distances(signed_distance(samples.sphere(2, radius=5.0), resolution=24), 1000, near=0.8)
+    >>> drawn
     Samples(1000 points, 800 near the surface, distances from -3.82 to 3.07)
-    >>> bool(np.abs(taken.normalized().points).max() < 1.3)
+    >>> bool(np.abs(drawn.normalized().points).max() < 1.3)
     True
     """
 
@@ -71,12 +71,16 @@ class Samples:
         Samples
             Points and distances in units of the radius.
 
+        See Also
+        --------
+        results.Samples.save : Write the samples.
+
         Examples
         --------
         >>> import numpy as np
         >>> import signedheat as sh
-        >>> taken = sh.complete(sh.samples.sphere(2, radius=5.0)).sample(10)
-        >>> bool(np.abs(taken.normalized().points).max() < 2 < np.abs(taken.points).max())
+        >>> drawn = sh.complete(sh.samples.sphere(2, radius=5.0)).sample(10)
+        >>> bool(np.abs(drawn.normalized().points).max() < 2 < np.abs(drawn.points).max())
         True
         """
         points, distances = (self.points - self.center) / self.radius, self.distances / self.radius
@@ -110,14 +114,18 @@ class Samples:
         FileFormatError
             If the name does not end with ``.npz``, or the file cannot be written.
 
+        See Also
+        --------
+        sample_distances : Make samples.
+
         Examples
         --------
         >>> import numpy as np
         >>> import tempfile
         >>> from signedheat import sample_distances, samples, signed_distance
-        >>> taken = sample_distances(signed_distance(samples.sphere(2), resolution=16), 10)
+        >>> drawn = sample_distances(signed_distance(samples.sphere(2), resolution=16), 10)
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     taken.save(f"{folder}/ball.npz")
+        ...     drawn.save(f"{folder}/ball.npz")
         ...     np.load(f"{folder}/ball.npz")["points"].shape
         (10, 3)
         """

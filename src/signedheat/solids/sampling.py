@@ -35,7 +35,7 @@ def sample_distances(
 ) -> Samples:
     """Sample points with distances and gradients, near the surface of a shape and around it.
 
-    Points near the surface are places on it, uniform in area, moved by normal noise along each axis. The others are
+    Points near the surface are points on it, uniform in area, moved by normal noise along each axis. The others are
     uniform in the cube around the bounding sphere. Distances are exact (`Solid.closest`), not interpolated.
 
     Parameters
@@ -77,8 +77,8 @@ def sample_distances(
     --------
     >>> from signedheat import samples, signed_distance
     >>> field = signed_distance(samples.without_faces(samples.sphere(3), 0.3), resolution=32)
-    >>> taken = sample_distances(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
-    >>> away = np.abs(taken.distances - (np.linalg.norm(taken.points, axis=1) - 1))
+    >>> drawn = sample_distances(field, 2000, near=0.5, widths=[0.1, 0.01], seed=7)
+    >>> away = np.abs(drawn.distances - (np.linalg.norm(drawn.points, axis=1) - 1))
     >>> bool(np.quantile(away, 0.9) < 0.01 and away.max() < 0.1)
     True
     """

@@ -209,8 +209,8 @@ class Solid(Displayed, Represented, Frozen):
 
         See Also
         --------
-        Solid.closest : Nearest places, gradients and confidence, too.
-        complete : With ``completion="none"``, nothing is completed in the first place.
+        Solid.closest : Nearest points, gradients and confidence, too.
+        complete : With ``completion="none"``, nothing is completed at all.
 
         Examples
         --------
@@ -247,6 +247,11 @@ class Solid(Displayed, Represented, Frozen):
         (...) bool
             True inside.
 
+        See Also
+        --------
+        Solid.distance : The distance, too.
+        Solid.closest : The nearest point, too.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -258,7 +263,7 @@ class Solid(Displayed, Represented, Frozen):
 
     @public_call
     def closest(self, points: ArrayLike) -> Closest:
-        """Find the nearest place of the surface for each point.
+        """Find the nearest point of the surface for each point.
 
         Parameters
         ----------
@@ -274,6 +279,11 @@ class Solid(Displayed, Represented, Frozen):
         ------
         GeometryError
             If a point is not finite.
+
+        See Also
+        --------
+        Solid.distance : The distance alone.
+        Solid.inside : The side alone.
 
         Examples
         --------
@@ -327,7 +337,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         Field
-            On the grid, or a `Band` of it. Its calls, closest places and contours are exact, since it keeps the solid.
+            On the grid, or a `Band` of it. Its calls, closest points and contours are exact, since it keeps the solid.
 
         Raises
         ------
@@ -339,6 +349,11 @@ class Solid(Displayed, Represented, Frozen):
             If a store is named without a band, or a scheduler without a store.
         UnsupportedTypeError
             If a grid is given, and options for the one around the solid, too.
+
+        See Also
+        --------
+        signed_distance : The same of a shape that is not completed yet.
+        Solid.distance : Distance at points, without a grid.
 
         Examples
         --------
@@ -420,7 +435,7 @@ class Solid(Displayed, Represented, Frozen):
 
         See Also
         --------
-        signedheat.offset : Round, mitred or sharp corners, and distances that vary.
+        offset : Round, mitred or sharp corners, and distances that vary.
         Solid.to_trimesh : The same surface as an object of trimesh.
 
         Examples
@@ -490,6 +505,11 @@ class Solid(Displayed, Represented, Frozen):
         GeometryError
             If nothing is left of the solid at this distance.
 
+        See Also
+        --------
+        offset : All options, and shapes that are not completed yet.
+        Solid.surface : The surface itself.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -520,6 +540,10 @@ class Solid(Displayed, Represented, Frozen):
         -------
         Samples
             The same for the same seed.
+
+        See Also
+        --------
+        sample_distances : All options, and shapes that are not completed yet.
 
         Examples
         --------
@@ -566,7 +590,7 @@ class Solid(Displayed, Represented, Frozen):
         See Also
         --------
         Solid.cut : Both halves of a solid, closed.
-        signedheat.to_shapely : The outlines as polygons with holes.
+        to_shapely : The outlines as polygons with holes.
         io.write_polylines : Write the outlines to a drawing.
 
         Examples
@@ -609,7 +633,7 @@ class Solid(Displayed, Represented, Frozen):
         See Also
         --------
         Solid.section : The outlines of the cut.
-        signedheat.fill_holes : Close holes, and leave the rest of a mesh as it is.
+        fill_holes : Close holes, and leave the rest of a mesh as it is.
 
         Examples
         --------
@@ -663,6 +687,10 @@ class Solid(Displayed, Represented, Frozen):
         Field
             Has values at the same nodes.
 
+        See Also
+        --------
+        Solid.field : A grid around the solid.
+
         Examples
         --------
         >>> from signedheat import complete, samples
@@ -697,6 +725,10 @@ class Solid(Displayed, Represented, Frozen):
         -------
         trimesh.Trimesh
             All faces, including the completion and sheets (`boundary`).
+
+        See Also
+        --------
+        Solid.surface : The surface that is converted.
 
         Examples
         --------
@@ -734,6 +766,11 @@ class Solid(Displayed, Represented, Frozen):
             If the format is unknown, or the file cannot be written.
         GeometryError
             If a surface is to be written, but nothing is inside.
+
+        See Also
+        --------
+        read : Read a solid or a surface.
+        Solid.surface : The surface that is written.
 
         Examples
         --------

@@ -126,6 +126,10 @@ class Thickness(Frozen):
         float
             From 0 to 1.
 
+        See Also
+        --------
+        results.Thickness.percentiles : Percentiles of the thickness.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -153,6 +157,10 @@ class Thickness(Frozen):
         SourceError
             If no wall has two opposite sides, as in a tetrahedron.
 
+        See Also
+        --------
+        results.Thickness.below : The share thinner than a length.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -172,12 +180,16 @@ class Thickness(Frozen):
         path : str or path
             ``.ply`` for the faces in colours, thin ones red, with a property ``thickness``; ``.npz`` for arrays
             ``vertices``, ``faces``, ``thickness`` and ``origins``; ``.png``, ``.pdf``, ``.svg`` or ``.jpg`` for a
-            picture of the outside and the thinnest place.
+            picture of the outside and of where it is thinnest.
 
         Raises
         ------
         FileFormatError
             If the format is unknown, or the file cannot be written.
+
+        See Also
+        --------
+        wall_thickness : Measure the thickness of walls.
 
         Examples
         --------
@@ -232,8 +244,8 @@ def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     --------
     >>> from signedheat import samples
     >>> plate = samples.union(samples.sphere(3), samples.sphere(3, radius=0.2, center=(3.0, 0.0, 0.0)))
-    >>> least, place = wall_thickness(plate).thinnest
-    >>> round(least, 1), round(float(place[0])) in (3, 4)
+    >>> least, point = wall_thickness(plate).thinnest
+    >>> round(least, 1), round(float(point[0])) in (3, 4)
     (0.4, True)
     """
     parts = whole_number(resolution, "resolution", 1)

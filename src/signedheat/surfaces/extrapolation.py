@@ -25,13 +25,13 @@ class Extrapolated:
     Heat falls by the factor e within √t. At τ = 1 that is about a cell, too little for the cells to resolve: the
     directions of step 1 keep an error of the size h²/t, which does not fall as the cells get smaller. A larger τ
     smooths the source, with an error of the size √t. Of the directions Y and their first two derivatives by t the
-    combination in which both cancel is taken. On triangles the error then falls about like their size, and is less than
+    combination in which both cancel is used. On triangles the error then falls about like their size, and is less than
     half as large on fine meshes; on the coarsest there is little to gain. The derivatives need no other factor: step 1
     solves three times with the same one. By default τ is 3 up to about 20,000 vertices, and beyond grows with the fifth
     root of their number.
 
     Where an oriented curve on a surface ends, away from its boundary, heat completes what is missing, and Y depends on
-    t by more than an error: in that connected part of the surface the directions of τ/3 are taken as they are.
+    t by more than an error: in that connected part of the surface the directions of τ/3 are used unchanged.
 
     Parameters
     ----------

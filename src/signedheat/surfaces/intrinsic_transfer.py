@@ -131,7 +131,7 @@ def transfer_segments(
     lost = misplaced_lines(after, lines, np.abs(at_piece))
     if len(lost):
         raise SourceError(
-            f"segment {lost[0]} of the curves crosses triangles as thin as rounding, which turn it",
+            f"segment {lost[0]} of the curves crosses triangles as thin as rounding, which flip it",
             remedy="merge the vertices that nearly coincide, or compute with intrinsic=False",
             element=f"segment {lost[0]}",
         )

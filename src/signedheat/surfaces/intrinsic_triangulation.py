@@ -178,6 +178,10 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         SourceError
             If a face does not exist.
 
+        See Also
+        --------
+        IntrinsicTriangulation.locate : Points of the mesh on the triangulation.
+
         Examples
         --------
         >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -211,6 +215,11 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         GeometryError
             If a coordinate is NaN or infinite.
 
+        See Also
+        --------
+        IntrinsicTriangulation.in_space : Positions of points in space.
+        IntrinsicTriangulation.transfer : The same for curves.
+
         Examples
         --------
         >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -238,6 +247,10 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         -------
         (p, 3) float
             Gradients at the points, in units of the values over a length.
+
+        See Also
+        --------
+        Field.gradient : The gradient of a field at points.
 
         Examples
         --------
@@ -288,6 +301,10 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         SourceError
             If there is not one value per vertex.
 
+        See Also
+        --------
+        Field.contour : The level set of a field.
+
         Examples
         --------
         >>> strip = TriangleMesh([[0, 0, 0], [9, 0, 0], [9, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
@@ -312,6 +329,10 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
             The edge that each straight part belongs to.
         starts, ends : (s, 3) float
             Where the part starts and ends in space.
+
+        See Also
+        --------
+        common_subdivision : The polygons between the edges of both triangulations.
 
         Examples
         --------
@@ -344,6 +365,10 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         -------
         CurveSegments or list of CurveSegments
             Segments, each within one triangle of the triangulation.
+
+        See Also
+        --------
+        IntrinsicTriangulation.locate : The same for single points.
 
         Examples
         --------
@@ -418,7 +443,7 @@ def intrinsic_delaunay(
         The surface.
     keep : Curve, SurfacePoints or a sequence of them
         Curves that are to run along edges, and points that are to be vertices; of the points of curves those are where
-        lines turn, end or meet. Or lists of (element, coordinates), as for `signed_distance`. Curves without length are
+        lines bend, end or meet. Or lists of (element, coordinates), as for `signed_distance`. Curves without length are
         left out if there are others. Other sources can be used as well.
     refine : bool
         Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet

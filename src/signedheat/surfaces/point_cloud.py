@@ -181,7 +181,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
             )
         elif share_of_two_sides(points, triangulated.normals) > MERGED_SHARE:
             warn_user(
-                "the points look like those of both sides of a plate thinner than they are apart, which are taken for "
+                "the points look like both sides of a plate thinner than their spacing, which count as "
                 "one side with noise. Give normals, or more points",
                 InexactWarning,
             )

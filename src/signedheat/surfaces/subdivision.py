@@ -80,7 +80,7 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
     lost = misplaced_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
     if len(lost):
         raise GeometryError(
-            f"edge {lost[0]} of the mesh crosses triangles as thin as rounding, which turn it",
+            f"edge {lost[0]} of the mesh crosses triangles as thin as rounding, which flip it",
             remedy="merge the vertices that nearly coincide",
             element=f"edge {lost[0]}",
         )

@@ -209,6 +209,10 @@ class Surface(Frozen, LinearDomain):
         (m,) float
             One for each vertex of the triangulation, which may have further ones inside polygons.
 
+        See Also
+        --------
+        Field.expand : A field on the vertices of the triangulation.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -240,6 +244,11 @@ class Surface(Frozen, LinearDomain):
         SourceError
             If there are fewer than two vertices, or one does not exist or has no face.
 
+        See Also
+        --------
+        TriangleMesh.polyline : Points in space, joined by geodesics.
+        TriangleMesh.shortest_path : The shortest curve between two vertices.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -256,10 +265,10 @@ class Surface(Frozen, LinearDomain):
         Parameters
         ----------
         start : int, (3,) float, Curve or SurfacePoints; or several of these two
-            A vertex, the place of the surface nearest to a point in space, or curves and points, of which the path
-            leaves the nearest place. With ``field.contour()``, it leads from the zero set of a field.
+            A vertex, the point of the surface nearest to a point in space, or curves and points, of which the path
+            leaves the nearest point. With ``field.contour()``, it leads from the zero set of a field.
         end : int, (3,) or (n, 3) float, or SurfacePoints
-            Where the path leads: the nearest of these places.
+            Where the path leads, to the nearest of these.
 
         Returns
         -------
@@ -269,11 +278,11 @@ class Surface(Frozen, LinearDomain):
         Raises
         ------
         SourceError
-            If the two lie on different connected components or at the same place, or a place does not exist.
+            If the two lie on different connected components or coincide, or a vertex or point does not exist.
 
         See Also
         --------
-        signedheat.signed_distance : Distance of all places from curves and points.
+        signed_distance : Distance of all vertices from curves and points.
         Curve : What is returned.
 
         Examples
@@ -307,6 +316,11 @@ class Surface(Frozen, LinearDomain):
         SourceError
             If there is no vertex, or one does not exist or has no face.
 
+        See Also
+        --------
+        TriangleMesh.path : Vertices joined by a curve.
+        signed_distance : Distance to points and curves.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -332,6 +346,10 @@ class Surface(Frozen, LinearDomain):
         ------
         SourceError
             If one lies in a face that does not exist.
+
+        See Also
+        --------
+        TriangleMesh.polyline : From positions in space to a curve.
 
         Examples
         --------
@@ -371,6 +389,12 @@ class Surface(Frozen, LinearDomain):
         SourceError
             If a point is too far away, or two consecutive points are not connected on the surface.
 
+        See Also
+        --------
+        TriangleMesh.path : A curve along vertices.
+        TriangleMesh.shortest_path : The shortest curve between two vertices.
+        close_curves : Complete broken curves.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -402,6 +426,11 @@ class Surface(Frozen, LinearDomain):
         SourceError
             If there is not one value per vertex.
 
+        See Also
+        --------
+        TriangleMesh.region_boundary : The boundary of some of the faces.
+        Field.contour : The level set of a distance.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -431,6 +460,11 @@ class Surface(Frozen, LinearDomain):
         SourceError
             If there is not one boolean per face.
 
+        See Also
+        --------
+        TriangleMesh.boundary_curves : The boundary of the whole surface.
+        TriangleMesh.level_set : Where a function has a value.
+
         Examples
         --------
         >>> import signedheat as sh
@@ -451,6 +485,10 @@ class Surface(Frozen, LinearDomain):
         -------
         list of Curve
             Closed loops, split at vertices where they touch each other.
+
+        See Also
+        --------
+        TriangleMesh.region_boundary : The boundary of some of the faces.
 
         Examples
         --------

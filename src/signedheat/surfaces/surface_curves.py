@@ -36,7 +36,7 @@ class Curve(Frozen):
         Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
     normals : (segments, 3) float, optional
         Direction in space in which φ grows across each segment. Needed where left has no meaning: for curves along
-        which a surface that is not orientable loses its orientation, and to make pieces agree whose faces are not
+        which a surface that is not orientable loses its orientation, and to make parts agree whose faces are not
         consistently oriented. Normals are projected on the surface; their lengths are ignored.
 
     Raises
@@ -109,6 +109,10 @@ class Curve(Frozen):
         -------
         Curve
             With the same points from last to first.
+
+        See Also
+        --------
+        orient : Flip curves so that they agree.
 
         Examples
         --------

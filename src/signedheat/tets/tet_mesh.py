@@ -42,7 +42,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         Positions; vertices that no tet uses are allowed.
     tets : (m, 4) int
         Vertex ids. As seen from the first corner the other three run clockwise if the volume is positive; tets with
-        negative volume are turned (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
+        negative volume are flipped (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
 
     Attributes
     ----------
@@ -148,6 +148,11 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         MissingPackageError
             If meshio is not installed.
 
+        See Also
+        --------
+        read : Read a file.
+        Field.save : Write a field on tets.
+
         Examples
         --------
         >>> import tempfile
@@ -178,6 +183,10 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         GeometryError
             If it has no tets, other cells with a volume, or tets of other than four corners.
 
+        See Also
+        --------
+        as_shape : A shape of any package's object.
+
         Examples
         --------
         >>> tet = TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]])
@@ -204,6 +213,10 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         MissingPackageError
             If meshio is not installed.
 
+        See Also
+        --------
+        TetMesh.from_meshio : The other way.
+
         Examples
         --------
         >>> TetMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 1, 2, 3]]).to_meshio().cells[0].type
@@ -229,6 +242,10 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         ------
         GeometryError
             If it has no tets, or other cells with a volume.
+
+        See Also
+        --------
+        as_shape : A shape of any package's object.
 
         Examples
         --------

@@ -74,7 +74,7 @@ def tet_source(
     loads = np.sum([_loads(mesh, polygons, np.sqrt(time)) for polygons in cuts], axis=0)
     if not np.abs(loads[:, :3]).max() > 1e-12 * np.abs(loads[:, 3]).max():
         raise SourceError(
-            "the normals of the source cancel each other everywhere", remedy="turn one of its coinciding sides"
+            "the normals of the source cancel each other everywhere", remedy="flip one of its coinciding sides"
         )
     leaving = np.flatnonzero(outside > 1e-9)
     patches = [_patches(mesh, unknowns, n_unknowns, *part) for part in zip(cuts, components, strict=True)]

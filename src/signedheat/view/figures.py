@@ -82,7 +82,7 @@ def range_of(values: Floats) -> tuple[float, float]:
         raise GeometryError("the field has no value anywhere", remedy="compute it anew", element="field")
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
     if not (np.isfinite(low) and np.isfinite(high)):
-        raise GeometryError("the field has infinite values", remedy="put NaN in their place", element="field")
+        raise GeometryError("the field has infinite values", remedy="replace them by NaN", element="field")
     return low, high
 
 
