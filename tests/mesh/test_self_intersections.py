@@ -1,11 +1,12 @@
 """Pairs of faces that pass through each other."""
 
+import time
+
 import numpy as np
 import pytest
 
 from signedheat import samples
 from signedheat.mesh import self_intersections as crossings
-from signedheat.mesh.box_tree import BoxTree
 
 
 def double_cone(n, depth):
@@ -38,26 +39,34 @@ def test_faces_around_a_vertex_are_found_around_it_as_they_are_in_space(shape, m
     np.testing.assert_array_equal(*around)
 
 
-def test_few_faces_of_a_fan_are_near_each_other():
-    points, faces = double_cone(2000, 0.0)
-    corners = points[faces]
-    hubs = crossings._hubs(faces, len(points))
-    tree = crossings.BoxTree.over(corners, crossings._order(corners, points, hubs), hubs)
-    assert len(tree.meeting(corners, 1e-8, hubs)[1]) < 20 * len(faces)
-
-
-def test_long_thin_faces_meet_few_others():
-    """Those of a cylinder and its round caps: their boxes overlap far from where they are."""
-    n = 1000
+def tube(n):
+    """Long thin faces of a cylinder, and its round caps."""
     angle, side = 2 * np.pi * np.arange(n) / n, np.arange(n)
+    after, top, bottom = (side + 1) % n, np.full(n, 2 * n), np.full(n, 2 * n + 1)
     ring = np.stack([np.cos(angle), np.sin(angle), np.zeros(n)], axis=1)
-    below, after = ring - [0, 0, 1], np.roll(ring, -1, axis=0)
-    walls = np.stack([ring, below, after], axis=1)
-    cap = np.stack([ring, after, np.zeros((n, 3))], axis=1)
-    triangles = np.concatenate([walls, cap])
-    order = np.concatenate([side, n + side])
-    starts, _ = BoxTree.over(triangles, order).meeting(walls, 1e-9)
-    assert np.diff(starts).max() < 40
+    points = np.concatenate([ring, ring - [0, 0, 3], [[0, 0, 0], [0, 0, -3]]])
+    walls = [[side, side + n, after], [after, side + n, after + n], [side, after, top], [side + n, bottom, after + n]]
+    return points, np.concatenate([np.stack(corners, axis=1) for corners in walls])
+
+
+def seconds_to_search(points, faces):
+    """Least of three measurements."""
+    seconds = []
+    for _ in range(3):
+        begin = time.process_time()
+        assert not len(crossings.self_intersections(points, faces))
+        seconds.append(time.process_time() - begin)
+    return min(seconds)
+
+
+@pytest.mark.parametrize("shape", [double_cone(10_000, 1.0), double_cone(10_000, 0.0), tube(5_000)])
+def test_long_thin_faces_take_as_long_as_others(shape):
+    """Their boxes overlap far from where they are; all pairs of them would take a hundred times as long."""
+    points, faces = shape
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    ball = samples.sphere(5)
+    usual = seconds_to_search(ball.vertices, ball.faces) / len(ball.faces)
+    assert seconds_to_search(points @ turn, faces) / len(faces) < 10 * usual
 
 
 def test_faces_on_fewer_than_three_places_overlap_nothing():
@@ -94,3 +103,41 @@ def test_pairs_of_some_faces_are_those_of_all_that_have_one_of_them_in_any_order
     expected = {tuple(pair) for pair in pairs[asked[pairs].any(axis=1)].tolist()}
     found = np.sort(order[crossings.self_intersections(points, mesh.faces[order], asked[order])], axis=1)
     assert {tuple(pair) for pair in found.tolist()} == expected
+
+
+def brute_force(points, faces):
+    """All pairs, one by one."""
+    ways, slack = np.empty((10, 3)), crossings.tolerances(points, faces, crossings.TOUCHING_DEPTH)
+    pairs = []
+    for f in range(len(faces)):
+        for g in range(f + 1, len(faces)):
+            shared = len(set(faces[f].tolist()) & set(faces[g].tolist()))
+            depth = slack[f] if shared else -slack[f]
+            if shared > 1:
+                met = crossings._overlapping(points[faces].reshape(-1, 9), faces, slack, f, g, ways)
+            else:
+                met = crossings.overlap(points[faces[f]].ravel(), points[faces[g]].ravel(), slack[f], depth, ways)
+            if met:
+                pairs.append((f, g))
+    return pairs
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.5])
+@pytest.mark.parametrize("turned", [0.0, 0.3])
+def test_pairs_are_those_of_all_comparisons(noise, turned):
+    rng = np.random.default_rng(2)
+    ball = samples.sphere(1)
+    points, faces = ball.vertices + noise * rng.normal(size=ball.vertices.shape), ball.faces.copy()
+    chosen = rng.random(len(faces)) < turned
+    faces[chosen] = faces[chosen][:, ::-1]
+    faces = np.concatenate([faces, np.where(faces == 0, 0, faces + len(points))])  # two balls with a common vertex
+    points = np.concatenate([points, points + np.array([0.9, 0.1, 0.2])])
+    assert crossings.self_intersections(points, faces).tolist() == [list(pair) for pair in brute_force(points, faces)]
+
+
+def test_a_fan_that_surrounds_its_vertex_twice_is_compared():
+    angle = 4 * np.pi * np.arange(14) / 14
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.02 * np.arange(14)], axis=1)
+    points, side = np.concatenate([rim, [[0, 0, 0.5]]]), np.arange(14)
+    faces = np.stack([side, (side + 1) % 14, np.full(14, 14)], axis=1)
+    assert len(crossings.self_intersections(points, faces)) == len(brute_force(points, faces)) > 0

@@ -21,10 +21,6 @@ SPREAD_BITS = (
     (2, 0x1249249249249249),
 )
 """Shifts and masks that spread the 21 low bits of a number so that each is followed by two zero bits."""
-LEAVES_AT_ONCE = 1 << 13
-"""Number of leaves whose slabs, on all `SLAB_LEVELS` levels above them, are computed at once; a power of two."""
-SLAB_LEVELS = 8
-"""Levels of a tree over triangles, from the leaves up, that are bounded by slabs as well."""
 
 
 class BoxTree(NamedTuple):
@@ -33,11 +29,6 @@ class BoxTree(NamedTuple):
     # (2 · leaves, 6) lower and upper corner of the box around all below each node; lower > upper for an empty node
     bounds: Floats
     items: Ints  # (leaves · BOXES_PER_LEAF,) the boxes in each leaf, −1 where there are none
-    groups: Ints  # (2 · leaves,) the group of all boxes below each node; −1 if they are of several
-    # (2 · leaves, 10) for two directions, the mean normal of a node and one across it and a long side: the direction,
-    # and the least and the largest coordinate along it of all below the node; or (0, 10)
-    slabs: Floats
-    triangles: Floats  # (n, 9) the triangles that the boxes are around, or (0, 9)
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> BoxTree:
@@ -50,8 +41,8 @@ class BoxTree(NamedTuple):
         return cls.of(*boxes_around(corners))
 
     @classmethod
-    def in_order(cls, lower: Floats, upper: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
-        """Build the tree over boxes in an order that keeps neighbours, and boxes of one group (−1: none), together."""
+    def in_order(cls, lower: Floats, upper: Floats, order: Ints) -> BoxTree:
+        """Build the tree over boxes in an order that keeps neighbours together."""
         n = len(lower)
         leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / BOXES_PER_LEAF))), 0)
         items = np.full(leaves * BOXES_PER_LEAF, -1, dtype=np.int64)
@@ -61,52 +52,33 @@ class BoxTree(NamedTuple):
         boxes[:, 3:] = -np.inf
         boxes[:n, :3], boxes[:n, 3:] = lower[items[:n]], upper[items[:n]]
         bounds[0] = 0
-        common = np.full(2 * leaves, -1, dtype=np.int64)
-        if groups is not None:
-            own = np.append(groups, -1)[items].reshape(leaves, BOXES_PER_LEAF)
-            common[leaves:] = np.where((own == own[:, :1]).all(axis=1), own[:, 0], -1)
         level, below = leaves, boxes.reshape(leaves, BOXES_PER_LEAF, 6)
         while level:
             bounds[level : 2 * level, :3] = boxes_around(below[..., :3])[0]
             bounds[level : 2 * level, 3:] = boxes_around(below[..., 3:])[1]
-            if level < leaves and groups is not None:
-                left, right = common[2 * level : 4 * level].reshape(-1, 2).T
-                common[level : 2 * level] = np.where(left == right, left, -1)
             below = bounds[level : 2 * level].reshape(-1, 2, 6) if level > 1 else below
             level //= 2
-        return cls(bounds, items, common, np.empty((0, 10)), np.empty((0, 9)))
+        return cls(bounds, items)
 
-    @classmethod
-    def over(cls, triangles: Floats, order: Ints, groups: Ints | None = None) -> BoxTree:
-        """Build the tree over (n, 3, 3) triangles in a given order, as `in_order` does, with slabs."""
-        tree = cls.in_order(*boxes_around(triangles), order, groups)
-        corners = np.ascontiguousarray(triangles).reshape(-1, 9)
-        return tree._replace(slabs=_slabs(triangles, tree.items), triangles=corners)
-
-    def meeting(
-        self, triangles: Floats, slack: float | Floats = 0.0, groups: Ints | None = None, leaves: Ints | None = None
-    ) -> tuple[Ints, Ints]:
+    def meeting(self, triangles: Floats, slack: float | Floats = 0.0) -> tuple[Ints, Ints]:
         """Find boxes within `slack` of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) the boxes.
 
         The slack is one number, or (n,) one for each triangle.
-        Nodes with only boxes of a triangle's own group, (n,), are skipped, and so are leaves before its own one, (n,).
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(len(triangles), slack)
-        own = np.full(len(corners), -1) if groups is None else np.ascontiguousarray(groups, dtype=np.int64)
-        first = np.zeros(len(corners), dtype=np.int64) if leaves is None else leaves
         starts, room = np.zeros(len(corners) + 1, dtype=np.int64), 64 * len(corners)  # faces of a mesh have about 40
         while True:
             near = np.empty(room, dtype=np.int64)
-            _meeting(self, corners, slacks, own, first, starts, near)
+            _meeting(self, corners, slacks, starts, near)
             if starts[-1] <= room:
                 return starts, near[: starts[-1]]
             room = int(starts[-1])
 
 
 @compiled
-def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: Ints, starts: Ints, out: Ints) -> None:
+def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, starts: Ints, out: Ints) -> None:
     """Write the boxes near each triangle into `out`, as far as there is room, and where they begin into `starts`."""
-    bounds, items, groups, slabs, triangles = tree
+    bounds, items = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
     for t in range(len(corners)):
@@ -132,19 +104,9 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
                 give += abs(ways[k, d]) * slacks[t]
             ends[k, 0], ends[k, 1] = ends[k, 0] - give, ends[k, 1] + give
         stack[0], depth, count = 1, 1, starts[t]
-        if first[t] > 0:
-            node = leaves + first[t]
-            stack[0] = node
-            while node > 1:  # push all that lies to the right of the way up to the root
-                if node % 2 == 0:
-                    stack[depth] = node + 1
-                    depth += 1
-                node //= 2
         while depth > 0:
             depth -= 1
             node = stack[depth]
-            if own[t] >= 0 and groups[node] == own[t]:
-                continue
             apart = False
             for d in range(3):
                 apart |= bounds[node, d] > upper[d] or bounds[node, 3 + d] < lower[d]
@@ -159,47 +121,16 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, own: Ints, first: I
                 apart |= height - reach > ends[k, 1] or height + reach < ends[k, 0]
             if apart:
                 continue
-            for s in range(0, 10 if len(slabs) else 0, 5):
-                least, most, give = np.inf, -np.inf, 0.0
-                for k in range(0, 9, 3):
-                    along = 0.0
-                    for d in range(3):
-                        along += slabs[node, s + d] * corners[t, k + d]
-                    least, most = min(least, along), max(most, along)
-                for d in range(3):
-                    give += abs(slabs[node, s + d]) * slacks[t]
-                apart |= least > slabs[node, s + 4] + give or most < slabs[node, s + 3] - give
-            if apart:
-                continue
             if node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
                 depth += 2
                 continue
             for place in range((node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF):
                 if items[place] >= 0:
-                    if len(triangles) and _is_beyond(triangles[items[place]], lower, upper, ways, ends):
-                        continue
                     if count < len(out):
                         out[count] = items[place]
                     count += 1
         starts[t + 1] = count
-
-
-@compiled
-def _is_beyond(triangle: Floats, lower: Floats, upper: Floats, ways: Floats, ends: Floats) -> bool:
-    """Return whether a triangle lies outside a box, or outside the interval between two `ends` along any direction."""
-    for d in range(3):
-        a, b, c = triangle[d], triangle[3 + d], triangle[6 + d]
-        if min(a, b, c) > upper[d] or max(a, b, c) < lower[d]:
-            return True
-    for k in range(len(ways)):
-        least, most = np.inf, -np.inf
-        for i in range(0, 9, 3):
-            along = ways[k, 0] * triangle[i] + ways[k, 1] * triangle[i + 1] + ways[k, 2] * triangle[i + 2]
-            least, most = min(least, along), max(most, along)
-        if least > ends[k, 1] or most < ends[k, 0]:
-            return True
-    return False
 
 
 def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
@@ -212,35 +143,6 @@ def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = 0.2) -> fl
     """Return the padding of a box: a share of its longest side for its completion, and room for offsets to `reach`."""
     lower, upper = np.asarray(bounds, dtype=np.float64)
     return share * float((upper - lower).max()) + 1.05 * reach
-
-
-@np.errstate(all="ignore")
-def _slabs(triangles: Floats, items: Ints) -> Floats:
-    """Return (2 · leaves, 10) the slabs around (n, 3, 3) triangles in the lowest nodes of a tree: see `BoxTree`."""
-    leaves, last = len(items) // BOXES_PER_LEAF, len(triangles) - 1
-    slabs, size = (
-        np.tile([0.0, 0.0, 0.0, -np.inf, np.inf], (2 * leaves, 2)),
-        min(leaves, LEAVES_AT_ONCE),
-    )  # slabs without bounds
-    for begin in range(0, leaves if last >= 0 else 0, size):
-        batch = items[begin * BOXES_PER_LEAF : (begin + size) * BOXES_PER_LEAF]
-        corners = triangles[np.where(batch < 0, items[last], batch)]
-        sides = np.roll(corners, -1, axis=1) - corners
-        normals = np.cross(sides[:, 0], sides[:, 1])
-        normals[batch < 0] = 0.0
-        lines = sides[np.arange(len(sides)), np.einsum("tcd,tcd->tc", sides, sides).argmax(axis=1)]
-        for level in range(min(SLAB_LEVELS, leaves.bit_length())):
-            count, below = size >> level, BOXES_PER_LEAF << level
-            normals = normals.reshape(count, -1, 3).sum(axis=1)
-            ways = np.stack([normals, np.cross(normals, lines[below // 2 :: below])], axis=1)
-            lengths = np.sqrt(np.einsum("nkd,nkd->nk", ways, ways))
-            ways /= np.where(lengths > 0.0, lengths, 1.0)[..., None]
-            heights = ways @ corners.reshape(count, -1, 3).transpose(0, 2, 1)
-            ends = np.stack([heights.min(axis=2), heights.max(axis=2)], axis=2)
-            first = (leaves + begin) >> level
-            own = slabs[first : first + count].reshape(count, 2, 5)
-            own[lengths > 0.0] = np.concatenate([ways, ends], axis=2)[lengths > 0.0]
-    return slabs
 
 
 def order_in_space(points: Floats) -> Ints:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, in_threads
-from .box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
+from .box_tree import BOXES_PER_LEAF, boxes_around, morton_codes
+from .turned_boxes import TurnedBoxes, boxes_apart, turned_apart
 from .unit_vectors import unit
 from .welding import same_positions, tolerances
 
@@ -15,6 +18,8 @@ TOUCHING_DEPTH = 1e-10
 """Depth up to which triangles only touch, relative to the size of the smaller of their parts."""
 COVERING_FOLD = 1e-10
 """One minus the cosine of the angle between two faces at their common edge, up to which one covers the other."""
+ARC_ROUNDING = 1e-6
+"""Angle between faces around a vertex, in radians, that may be rounding."""
 CROWD = 64
 """Number of faces around a vertex above which their intersections are found by directions from it, not in space."""
 
@@ -40,41 +45,47 @@ def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bool
         return np.zeros((0, 2), dtype=np.int64)
     vertices = np.ascontiguousarray(vertices, dtype=np.float64)
     hubs = _hubs(faces, len(vertices))
-    if asked is None:
-        order = _order(vertices.take(faces, axis=0), vertices, hubs)
-    else:  # all faces search among those asked for, which come first
-        order = np.flatnonzero(asked)
-        order = np.append(order[_order(vertices[faces[order]], vertices, hubs[order])], np.flatnonzero(~asked))
+    order = _order(vertices.take(faces, axis=0), vertices, hubs)
     ids, hubs, slacks = np.ascontiguousarray(faces[order], dtype=np.int64), hubs[order], slacks[order]
-    corners = vertices.take(ids, axis=0)
-    flat = corners.reshape(-1, 9)
+    asked = np.ones(len(ids), dtype=np.bool_) if asked is None else asked[order]
+    corners = vertices.take(ids, axis=0).reshape(-1, 9)
+    triangles = Triangles(corners, ids, slacks)
+    pairs = _near(TurnedBoxes.of(corners, slacks, hubs, asked), triangles, False)
     fans = np.flatnonzero(hubs >= 0)
-    places = np.arange(len(ids))
-    from_leaf = np.where(places < count, places // BOXES_PER_LEAF, 0)
-    tree = BoxTree.over(corners[:count], places[:count], hubs[:count])
-    arcs = _arcs(vertices, ids[fans], hubs[fans]) if len(fans) else corners[:0]
-    around = BoxTree.around(arcs) if len(fans) else tree
-
-    def overlapping(first: Ints, second: Ints) -> Ints:
-        return np.stack([first, second], axis=1)[_overlapping(flat, ids, first, second, slacks)]
-
-    def of_tree(start: int) -> Ints:
-        batch = slice(start, start + ROWS_PER_TASK)
-        starts, near = tree.meeting(corners[batch], slacks[batch], hubs[batch], from_leaf[batch])
-        owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        chosen = ((near > owners) | (owners >= count)) & ((hubs[owners] < 0) | (hubs[owners] != hubs[near]))
-        return overlapping(owners[chosen], near[chosen])
-
-    def of_fans(start: int) -> Ints:
-        starts, near = around.meeting(arcs[start : start + ROWS_PER_TASK], 1e-6)  # angle against rounding
-        owners = start + np.repeat(np.arange(len(starts) - 1), np.diff(starts))
-        chosen = (near > owners) & (hubs[fans[owners]] == hubs[fans[near]])
-        return overlapping(fans[owners[chosen]], fans[near[chosen]])
-
-    parts = list(in_threads(of_tree, range(0, len(ids), ROWS_PER_TASK)))
-    parts += in_threads(of_fans, range(0, int((fans < count).sum()), ROWS_PER_TASK))
-    pairs = np.sort(order[np.concatenate(parts)], axis=1)
+    if len(fans):
+        arcs = _arcs(vertices, ids[fans], hubs[fans])
+        around = np.argsort(morton_codes(arcs.mean(axis=1)), kind="stable")
+        fans, arcs, angles = fans[around], arcs[around].reshape(-1, 9), np.full(len(fans), ARC_ROUNDING)
+        triangles = Triangles(corners[fans], ids[fans], slacks[fans])
+        tree = TurnedBoxes.of(arcs, angles, hubs[fans], asked[fans])
+        pairs = np.concatenate([pairs, fans[_near(tree, triangles, True)]])
+    pairs = np.sort(order[pairs], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+
+
+class Triangles(NamedTuple):
+    """Triangles that may overlap."""
+
+    corners: Floats  # (n, 9)
+    ids: Ints  # (n, 3) vertices
+    slacks: Floats  # (n,)
+
+
+def _near(tree: TurnedBoxes, triangles: Triangles, around: bool) -> Ints:
+    """Return (k, 2) pairs of triangles that overlap, given a tree of them: those `around` one hub, or all others."""
+    count = len(triangles.corners)
+    tasks = 1 << max((count // ROWS_PER_TASK).bit_length() - 1, 0)
+
+    def of_task(task: int) -> Ints:
+        room = ROWS_PER_TASK
+        while True:
+            found = np.empty((room, 2), dtype=np.int64)
+            count = _pairs_of(tree, triangles, around, task, 2 * tasks, found)
+            if count <= room:
+                return found[:count]
+            room = count
+
+    return np.concatenate(list(in_threads(of_task, range(tasks, 2 * tasks))))
 
 
 def _hubs(faces: Ints, n_vertices: int) -> Ints:
@@ -110,22 +121,85 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
 
 
 @compiled
-def _overlapping(corners: Floats, ids: Ints, first: Ints, second: Ints, slacks: Floats) -> Bools:
-    """Return (k,) whether pairs of triangles overlap, or, if they have a common edge, are folded along it."""
-    result, ways = np.empty(len(first), dtype=np.bool_), np.empty((10, 3))
-    for k in range(len(first)):
-        f, g = first[k], second[k]
-        shared, apex, beyond = 0, 3, 3  # apex and beyond: 0 + 1 + 2 less two common corners is the third
-        for i in range(3):
-            for j in range(3):
-                if ids[f, i] == ids[g, j]:
-                    shared, apex, beyond = shared + 1, apex - i, beyond - j
-        if shared == 2:
-            result[k] = _is_folded(corners[f], corners[g], apex, beyond)
-        else:
-            slack = min(slacks[f], slacks[g])
-            result[k] = shared > 2 or overlap(corners[f], corners[g], slack, slack if shared else -slack, ways)
-    return result
+def _pairs_of(tree: TurnedBoxes, triangles: Triangles, around: bool, node: int, end: int, out: Ints) -> int:
+    """Write pairs of triangles below a node, and of these with those of later nodes, as far as there is room.
+
+    Returns their number.
+    """
+    own, largest, turned = tree
+    corners, ids, slacks = triangles
+    count, stack, ways = 0, np.empty((256, 2), dtype=np.int64), np.empty((10, 3))
+    leaves, n = len(largest) // 2, len(corners)
+    for other in range(node, end):
+        stack[0, 0], stack[0, 1], depth = node, other, 1
+        while depth > 0:
+            depth -= 1
+            a, b = stack[depth, 0], stack[depth, 1]
+            slack = min(largest[a, 6], largest[b, 6])
+            if a != b and (boxes_apart(largest, a, b, slack) or turned_apart(turned, a, b, slack)):
+                continue
+            if largest[a, 7] + largest[b, 7] <= 0.0:  # none asked for
+                continue
+            if not around and largest[a, 8] >= 0.0 and largest[a, 8] + largest[a, 9] == 0.0:  # all of one hub
+                if largest[b, 8] == largest[a, 8] and largest[b, 9] == largest[a, 9]:
+                    continue
+            if a < leaves:
+                for i in range(4):
+                    if a != b or i != 2:
+                        stack[depth, 0], stack[depth, 1] = 2 * a + i // 2, 2 * b + i % 2
+                        depth += 1
+                continue
+            first, second = (a - leaves) * BOXES_PER_LEAF, (b - leaves) * BOXES_PER_LEAF
+            for f in range(first, min(first + BOXES_PER_LEAF, n)):
+                for g in range(f + 1 if a == b else second, min(second + BOXES_PER_LEAF, n)):
+                    if boxes_apart(own, f, g, slack) or own[f, 7] + own[g, 7] <= 0.0:
+                        continue
+                    if (own[f, 8] >= 0.0 and own[f, 8] == own[g, 8]) != around:
+                        continue
+                    if _overlapping(corners, ids, slacks, f, g, ways):
+                        if count < len(out):
+                            out[count, 0], out[count, 1] = f, g
+                        count += 1
+    return count
+
+
+@compiled
+def _overlapping(corners: Floats, ids: Ints, slacks: Floats, f: int, g: int, ways: Floats) -> bool:
+    """Return whether two triangles overlap, or, if they have a common edge, are folded along it."""
+    shared, apex, beyond = 0, 3, 3  # apex and beyond: 0 + 1 + 2 less two common corners is the third
+    for i in range(3):
+        for j in range(3):
+            if ids[f, i] == ids[g, j]:
+                shared, apex, beyond = shared + 1, apex - i, beyond - j
+    if shared == 2:
+        return _is_folded(corners[f], corners[g], apex, beyond)
+    if shared == 1 and _beside(corners, f, g, 3 - apex, 3 - beyond):
+        return False
+    slack = min(slacks[f], slacks[g])
+    return shared > 2 or overlap(corners[f], corners[g], slack, slack if shared else -slack, ways)
+
+
+@compiled
+def _beside(corners: Floats, f: int, g: int, i: int, j: int) -> bool:
+    """Return whether a plane between triangles with one common corner, `i` and `j`, has each on one side.
+
+    It is upright on the difference of the directions of their middles, as seen from that corner.
+    """
+    first, second = 0.0, 0.0
+    a, b, c, d = 3 * ((i + 1) % 3), 3 * ((i + 2) % 3), 3 * ((j + 1) % 3), 3 * ((j + 2) % 3)
+    for e in range(3):
+        o = corners[f, 3 * i + e]
+        first += (corners[f, a + e] - o + corners[f, b + e] - o) ** 2
+        second += (corners[g, c + e] - o + corners[g, d + e] - o) ** 2
+    if not (first > 0.0 and second > 0.0):
+        return False
+    first, second, u, v, w, x = 1.0 / np.sqrt(first), 1.0 / np.sqrt(second), 0.0, 0.0, 0.0, 0.0
+    for e in range(3):
+        o = corners[f, 3 * i + e]
+        p, q, r, s = corners[f, a + e] - o, corners[f, b + e] - o, corners[g, c + e] - o, corners[g, d + e] - o
+        way = first * (p + q) - second * (r + s)
+        u, v, w, x = u + way * p, v + way * q, w + way * r, x + way * s
+    return u >= 0.0 and v >= 0.0 and w <= 0.0 and x <= 0.0
 
 
 @compiled
