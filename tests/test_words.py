@@ -1,12 +1,16 @@
-"""Numbers in sentences."""
+"""Numbers in sentences, and the words and signs of documents and docstrings."""
 
 from __future__ import annotations
 
+import inspect
 import re
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from public_names import PUBLIC, methods
 from signedheat import diagnostics
 from signedheat.errors import Sentence, counted, percent
 
@@ -38,3 +42,42 @@ def test_notes_have_no_exponents_in_percent_and_no_wrong_plurals():
     ]
     for note in notes:
         assert not re.search(r"e\+|[0-9]%|\b1 [a-z]+s\b", str(note)), str(note)
+
+
+ROOT = Path(__file__).parents[1]
+PAGES = sorted([*(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
+DOCUMENTED = [(name, inspect.getdoc(thing) or "") for name, thing in [*PUBLIC, *methods()]]
+DIALECT = r"\b(turned|turns? (?=to|what|curves|faces)|pieces?|rims?|places?)\b"
+"""Words for which the field has better ones: flipped, patches or strokes, boundary loops, points or positions."""
+
+
+def sentences(text: str) -> Iterator[str]:
+    """The sentences of paragraphs, lists and cells of tables, without code, links and bold openings."""
+    for pattern, instead in (
+        (r"```.*?```", ""), (r"``.*?``|`[^`]*`", "code"), (r"\]\([^)]*\)", "]"), (r"\*\*[^*]*\*\*:?", ""),
+    ):  # fmt: skip
+        text = re.sub(pattern, instead, text, flags=re.S)
+    for block in re.split(r"\n\s*\n|\n(?=[*|#>-] ?|\d\.)|\|", text):
+        yield from re.split(r"(?<=[.!?])\s+(?=[A-Z\"(*\[∇φε]|code)", " ".join(block.split()))
+
+
+def prose(docstring: str) -> str:
+    """A docstring without its headings, lists of other things to look at, names of parameters and examples."""
+    text = docstring.partition("Examples\n---")[0]
+    text = re.sub(r"See Also\n-+\n.*?(\n\n|\Z)", "\n\n", text, flags=re.S)
+    return re.sub(r"^[^\s].* : .*$|^.*\n-{3,}$", "\n", text, flags=re.M)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_sentences_of_pages_have_one_colon_or_semicolon_at_most(page):
+    text = page.read_text(encoding="utf-8")
+    assert [each for each in sentences(text) if len(re.findall(r"[;:](?=\s|$)", each)) > 1] == []
+    code = re.sub(r"```.*?```|`[^`]*`", "", text, flags=re.S)
+    assert re.findall(r"(?<![\w.…/*])\.\d", code) == []  # 0.5, not .5
+
+
+@pytest.mark.parametrize(("name", "docstring"), DOCUMENTED, ids=[name for name, _ in DOCUMENTED])
+def test_docstrings_use_the_words_of_the_field(name, docstring):
+    text = re.sub(r"``.*?``|`[^`]*`|in place of", "code", prose(docstring), flags=re.S)
+    assert re.findall(DIALECT, text) == []
+    assert [each for each in sentences(text) if len(re.findall(r"[;:](?=\s|$)", each)) > 1] == []

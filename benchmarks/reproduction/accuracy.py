@@ -221,7 +221,7 @@ def convergence(page: Page) -> None:
 @figure("section-9.5", "Broken curves")
 def broken_curves_on_surfaces(page: Page) -> None:
     """Five surfaces, ten seeds each, a closed curve in twelve pieces, damaged in seven ways
-    (`benchmarks/broken_curves.py`; all but the first three with 25 % gone). ε as median / worst; in brackets, how
+    (`benchmarks/broken_curves.py`, all but the first three with 25 % gone). ε as median / worst; in brackets, how
     often a program failed. Surface winding numbers (SWN, Feng et al. 2023) give the sign in the last column. With half
     gone, `sh.signed_distance` is off by more than 4 % on eight of the twenty stars, six of which it announces; at worst
     it leaves out seven of twelve pieces.

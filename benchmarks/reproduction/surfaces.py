@@ -75,7 +75,8 @@ def mixed_sources(page: Page) -> None:
 @figure("10", "Level set constraints")
 def level_set_constraints(page: Page) -> None:
     """Three concentric circles, given as partial level sets of one distance: constant along each is right, zero along
-    all contradicts the distance. Spread: largest difference of φ along one circle; slope error: mean of |1 − |∇φ||.
+    all contradicts the distance. *Spread* is the largest difference of φ along one circle, *slope error* the mean of
+    |1 − |∇φ||.
     """
     mesh = shapes.flat_disk(3000)
     curves = [shapes.placed(mesh, circle(radius)) for radius in (0.6, 1.0, 1.5)]

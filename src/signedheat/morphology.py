@@ -330,8 +330,9 @@ def offset(
         interpolated linearly; a function maps (n, 3) points on the shape to distances. The grid has room for its values
         at the vertices and at some thousand points between them.
     corners : {"round", "mitre", "sharp"}
-        Shape of edges where offset faces move apart: rounded at the distance ("round"), or mitred: the offset planes
-        of the faces are extended up to two distances ("mitre", which keeps boxes) or ten ("sharp").
+        Shape of edges where offset faces move apart. With "round", they are rounded at the distance. Else they are
+        mitred: the offset planes of the faces are extended up to two distances ("mitre", which keeps boxes) or ten
+        ("sharp").
     resolution : int
         Nodes along the longest side of a grid around the surface.
     spacing : float or (3,) float, optional

@@ -172,14 +172,14 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         ----------
         sources : one source or a sequence of them
             On surfaces: `Curve`, `SurfacePoints`, or potpourri3d's lists of (element, coordinates). In space:
-            `TriangleMesh`, `PolygonMesh`, `PointCloud`; in the plane: `Polyline`.
+            `TriangleMesh`, `PolygonMesh`, `PointCloud`. In the plane: `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
             Constraint on φ at the sources; `ZeroSet` by default.
 
         Returns
         -------
         Field
-            On the domain; φ > 0 on the side that the source normals point to (on a surface: to the left of a curve).
+            On the domain. φ > 0 on the side that the source normals point to, on a surface to the left of a curve.
 
         Raises
         ------

@@ -75,8 +75,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
     domain : Grid, Band, TetMesh, TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, IntrinsicTriangulation
         Where the values are. `piecewise_distance` returns fields on a `results.CutSurface`.
     values : array
-        φ, in the units of the domain: ``values[i, j, k]`` at ``grid.points[i, j, k]`` of a grid; (n_vertices,) on tets
-        and surfaces; (n, 8, 8, 8) in the blocks of a band. Positive on the side that the normals of the source point
+        φ, in the units of the domain: ``values[i, j, k]`` at ``grid.points[i, j, k]`` of a grid, (n_vertices,) on tets
+        and surfaces, (n, 8, 8, 8) in the blocks of a band. Positive on the side that the normals of the source point
         to, so negative inside a shape with outward normals. NaN where no source is connected.
     diagnostics : Diagnostics
         Timings, diffusion time, and notes on the computation.
@@ -174,8 +174,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
     def interpolate(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
         """φ at points, from the values around them.
 
-        On grids by multilinear interpolation between the nodes that have a value, beyond a band between the coarse
-        ones; on tets to second order, from values and gradients at the vertices; on surfaces linearly in each triangle.
+        Interpolation is multilinear between the nodes of grids that have a value, and beyond a band between the coarse
+        nodes. It is of second order in tets, from values and gradients at the vertices, and linear in triangles.
         Outside a grid or tets, φ continues linearly from the nearest point of the domain, along the gradient there:
         this is continuous, and for a convex shape inside the box of a grid a lower bound of the distance.
 
@@ -205,8 +205,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
         """∇φ in space at points: exact where the field has its solid, else that of the interpolant.
 
-        On grids these are central differences, interpolated; on tets volume-weighted means at the vertices,
-        interpolated; on surfaces the gradient in the triangle. Outside a grid or tets, it is the gradient at the
+        On grids these are central differences, interpolated, on tets volume-weighted means at the vertices,
+        interpolated, and on surfaces the gradient in the triangle. Outside a grid or tets, it is the gradient at the
         nearest point of the domain.
 
         Parameters
@@ -395,7 +395,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self if domain is self.domain else Field(domain, values, self.diagnostics, solid=self.solid)
 
     def plain(self) -> Field[FieldDomain]:
-        """Give φ on a domain that files and viewers know: of voxels, their faces; elsewhere as `restrict` or `expand`.
+        """Give φ on a domain that files and viewers know: the faces of voxels, or what `restrict` or `expand` return.
 
         Returns
         -------
@@ -568,8 +568,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Returns
         -------
         pyvista.DataSet
-            `pyvista.ImageData` of a grid, with z = 0 in the plane, and of a band that of the coarse field;
-            `pyvista.UnstructuredGrid` of tets; `pyvista.PolyData` of a surface, cut open where φ jumps. The values are
+            `pyvista.ImageData` of a grid, with z = 0 in the plane, and of a band that of the coarse field,
+            `pyvista.UnstructuredGrid` of tets, `pyvista.PolyData` of a surface, cut open where φ jumps. The values are
             point data ``signed_distance``; ``confidence`` is there, too, where the field has it.
 
         Raises
@@ -600,8 +600,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Parameters
         ----------
         path : str or path
-            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``; in a band ``.npz``, ``.vdb`` or, with
-            all nodes of the grid, ``.vti``; on tets ``.vtu``, ``.vtk`` or ``.msh``; on surfaces ``.ply`` or ``.vtp``
+            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``. In a band ``.npz``, ``.vdb`` or, with
+            all nodes of the grid, ``.vti``. On tets ``.vtu``, ``.vtk`` or ``.msh``. On surfaces ``.ply`` or ``.vtp``
             with a property ``signed_distance`` per vertex, ``.obj`` with a texture coordinate, or ``.npz``. Not read
             are ``.vdb`` and ``.obj``. The file is written under a temporary name and renamed, so that an existing one
             survives a failure.

@@ -25,7 +25,7 @@ class Closest:
     faces : (...) int
         Face of the given shape on which each point lies; −1 on the completion.
     barycentric : (..., 3) float
-        Position in that face, if it is a triangle: the weights of its corners; NaN elsewhere.
+        Weights of the corners of that face, if it is a triangle. NaN elsewhere.
     gradients : (..., 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
     confidence : (...) float

@@ -52,7 +52,7 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     ----------
     path : str or path
         A ``.json`` file with vertex ids and weights, or with ``{"polylines": [{"points": [[x, y, z], …], "closed":
-        false}, …]}``; a ``.obj`` file with line elements; or a ``.csv`` file with x, y and z on each line and an empty
+        false}, …]}``, a ``.obj`` file with line elements, or a ``.csv`` file with x, y and z on each line and an empty
         line between polylines. Points in space are projected onto the surface, unless the vertices of an ``.obj``
         file are those of the mesh.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface

@@ -387,7 +387,7 @@ def read_polylines(path: PathLike) -> list[Polyline]:
         user units, 96 of which are an inch. The y axis, which points down in such files, is flipped, so that the left
         of a path is its left in the drawing. Subpaths without length are left out. Where a file says ``fill-rule:
         evenodd``, closed subpaths become the outlines of what they fill. ``.csv``: x and y on each line, an empty line
-        between polylines; a polyline is closed if its last point equals its first. ``.geojson``: lines, and the
+        between polylines. A polyline is closed if its last point equals its first. ``.geojson``: lines, and the
         rings of polygons, in the plane of their coordinates. ``.dxf``, by the package ezdxf: lines, polylines, arcs,
         circles, ellipses, splines and hatches, those of blocks where these are inserted, seen along z. What closes
         becomes the outlines of what lies within an odd number of them.

@@ -109,8 +109,8 @@ def read_field(path: PathLike) -> Field:
     ----------
     path : str or path
         A ``.npz``, ``.vti``, ``.nrrd`` or ``.npy`` (with its ``.json``) file; images of other programs can be read if
-        their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets; ``.ply``, ``.vtp``,
-        or ``.npz`` with vertices, one on a surface; ``.npz`` with blocks one in a band.
+        their axes are x, y, z. A ``.vtu``, ``.vtk`` or ``.msh`` file has a field on tets, a ``.ply``, ``.vtp``
+        or ``.npz`` file with vertices one on a surface, and an ``.npz`` file with blocks one in a band.
 
     Returns
     -------

@@ -102,8 +102,8 @@ def read(path: PathLike) -> Shape | Solid:
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
-        A triangle mesh if all faces are triangles, otherwise a polygon mesh; a point cloud if there is no face; the
-        boundary of a volume of voxels; a tet mesh; or a solid.
+        A triangle mesh if all faces are triangles, otherwise a polygon mesh, and a point cloud if there is no face. Of
+        other files, the boundary of a volume of voxels, a tet mesh, or a solid.
 
     Raises
     ------

@@ -95,8 +95,8 @@ class Displayed:
     def plotter(self) -> pyvista.Plotter:
         """Draw this into a `pyvista.Plotter`, to which more can be added, and which can be saved to a file.
 
-        Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero;
-        the surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
+        Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero.
+        The surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
 
         Returns
         -------

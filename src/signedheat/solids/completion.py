@@ -176,8 +176,8 @@ def complete(
     keep_overlaps : bool
         Keep surfaces that lie inside other bodies.
     nested : {"given", "cavities", "bodies"}
-        What bodies within others are: bodies or cavities, by their orientation; cavities, with bodies inside those, as
-        in slicers; or always bodies.
+        What bodies within others are. With "given", bodies or cavities, by their orientation. With "cavities",
+        cavities, and bodies inside those, as in slicers. With "bodies", always bodies.
     seal : float, optional
         Seal openings of meshes narrower than this length, to about a sixth of it, and fill what lies behind them: of
         double skins, leaks, bodies within and rubbish, only what is reached from outside is left, as it was given.

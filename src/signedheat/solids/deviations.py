@@ -246,8 +246,8 @@ class Deviation(Frozen):
         Parameters
         ----------
         path : str or path
-            ``.ply`` for the scan in colours, blue below the part and orange above; ``.png``, ``.pdf``, ``.svg`` or
-            ``.jpg`` for a picture of it with a histogram; ``.csv`` for a line for each point with its position,
+            ``.ply`` for the scan in colours, blue below the part and orange above. ``.png``, ``.pdf``, ``.svg`` or
+            ``.jpg`` for a picture of it with a histogram. ``.csv`` for a line for each point with its position,
             deviation and nearest point.
 
         Raises

@@ -52,7 +52,7 @@ class Filled:
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledMesh(Filled, TriangleMesh):
-    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones; see `Filled`.
+    """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones.
 
     See Also
     --------
@@ -62,7 +62,7 @@ class FilledMesh(Filled, TriangleMesh):
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledPolygonMesh(Filled, PolygonMesh):
-    """Polygons whose holes were closed: those that were given, then triangles; see `Filled`.
+    """Polygons whose holes were closed: those that were given, then triangles.
 
     See Also
     --------
@@ -110,9 +110,9 @@ def fill_holes(
     Returns
     -------
     FilledMesh or FilledPolygonMesh
-        A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes: ``origins``, (m,) int,
-        the number of each face in the given mesh, −1 for new ones; ``filled`` and ``left``, the vertices around each
-        rim that was closed, and around each that is still open.
+        A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes. ``origins``, (m,) int,
+        is the number of each face in the given mesh, −1 for new ones. ``filled`` and ``left`` are the vertices of each
+        boundary loop that was closed, and of each that is still open.
 
     Raises
     ------

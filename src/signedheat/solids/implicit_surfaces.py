@@ -153,7 +153,7 @@ def contour(
     sharp : bool
         Use dual contouring; otherwise marching cubes, which cut edges off.
     gradient : callable, or (nx, ny, nz, 3) float, optional
-        Gradients: of a function at (n, 3) points; of an array at its nodes, or a function that gives those.
+        Gradients. Of a function, at (n, 3) points; of an array, at its nodes, or a function that gives those.
         Differences by default.
     resolution : int, optional
         Number of cells along the longest side of the box, for a function without `spacing`; 128 by default.

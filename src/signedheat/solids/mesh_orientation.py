@@ -139,8 +139,8 @@ def orientation(
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
         The surface that the curves lie on.
     nested : {"given", "cavities", "bodies"}
-        Of meshes: what closed parts within others are. What they were given as, relative to the part they lie in;
-        cavities, and bodies within these; or all bodies.
+        Of meshes: what closed parts within others are. With "given", what they were given as, relative to the part
+        they lie in. With "cavities", cavities, and bodies within these. With "bodies", all bodies.
 
     Returns
     -------

@@ -41,7 +41,7 @@ def sample_distances(
     Parameters
     ----------
     shape : Field, Solid or shape
-        A distance in space, from `signed_distance` or ``sharpen(field, shape)``; a solid; or a shape, completed here.
+        A distance in space, from `signed_distance` or ``sharpen(field, shape)``, a solid, or a shape, completed here.
     n : int
         Number of points.
     near : float

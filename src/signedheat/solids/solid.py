@@ -329,8 +329,8 @@ class Solid(Displayed, Represented, Frozen):
             Folder for the values of a band, which are mapped into memory as they are used. A second run resumes where
             the first was stopped. Workers must be able to read and write it.
         scheduler : concurrent.futures.Executor, distributed.Client or str, optional
-            Computes the tiles of a store. By default, threads of this process; or a pool, such as a
-            `ProcessPoolExecutor`; or a Dask cluster, by its client or its address, such as ``"tcp://127.0.0.1:8786"``.
+            Computes the tiles of a store. By default, threads of this process. Or a pool, such as a
+            `ProcessPoolExecutor`, or a Dask cluster, by its client or its address, such as ``"tcp://127.0.0.1:8786"``.
         progress : callable, optional
             Called as ``progress(fraction, step)``. An exception that it raises cancels.
 

@@ -178,8 +178,8 @@ class Thickness(Frozen):
         Parameters
         ----------
         path : str or path
-            ``.ply`` for the faces in colours, thin ones red, with a property ``thickness``; ``.npz`` for arrays
-            ``vertices``, ``faces``, ``thickness`` and ``origins``; ``.png``, ``.pdf``, ``.svg`` or ``.jpg`` for a
+            ``.ply`` for the faces in colours, thin ones red, with a property ``thickness``. ``.npz`` for arrays
+            ``vertices``, ``faces``, ``thickness`` and ``origins``. ``.png``, ``.pdf``, ``.svg`` or ``.jpg`` for a
             picture of the outside and of where it is thinnest.
 
         Raises

@@ -18,7 +18,7 @@ from ..validation import array_of, finite_rows, flag, frozen, whole_numbers
 class Curve(Frozen):
     """A polyline on a surface; φ > 0 to its left if it is oriented.
 
-    Left is the direction of the curve turned by 90° counter-clockwise, as seen with the face normal towards you. For a
+    Left is the direction of the curve rotated by 90° counter-clockwise, as seen with the face normal towards you. For a
     segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, the
     side is that of most of the curve, and is kept along it. Points on an edge or at a vertex are recognised
     as such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
