@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.mesh.welding import ONE_PLACE, joined_rims, same_positions
+from signedheat.mesh.welding import ONE_PLACE, joined_rims, same_positions, welded, welded_within
 
 PLACES = ((0, 0, 0), (1e3, -1e3, 10), (431250, 5412300, 100), (1e6, 1e6, 1e6), (1e7, 0, 0), (1e7, 1e7, 1e7))
 SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
@@ -78,3 +78,27 @@ def test_slivers_whose_sizes_differ_by_forty_decades_are_joined_in_the_end():
     points = slivers.astype(np.float32).astype(float).reshape(-1, 3)
     joined = joined_rims(points, np.arange(9), np.arange(9) // 3 * 3 + (np.arange(9) + 1) % 3, ONE_PLACE)
     assert (joined[joined] == joined).all()
+
+
+@pytest.mark.parametrize("far", [1e12, 1e19, 1e25, 1e35, 1e300])
+def test_points_far_away_join_none_of_those_here(far):
+    here = np.random.default_rng(0).random((200, 3))
+    points = np.concatenate([here, here + np.array([1e-10, 0, -1e-10]), here * far, here * far])
+    one = np.arange(200)
+    there = np.concatenate([400 + one, 400 + one])
+    np.testing.assert_array_equal(welded(points, 1e-9), np.concatenate([one, one, there]))
+    reaches = np.repeat([1e-9, 1e-9 * far], 400)
+    np.testing.assert_array_equal(welded_within(points, reaches), np.concatenate([one, one, there]))
+    np.testing.assert_array_equal(welded(points, 0.0), np.concatenate([np.arange(400), there]))
+
+
+@pytest.mark.parametrize("far", [1e6, 1e20, 1e30, 1e35])
+@pytest.mark.parametrize("other", [1e3, 1e12])
+def test_two_corners_far_away_take_no_other_face_with_them(far, other):
+    ball = sh.samples.sphere(1)
+    vertices = ball.vertices.copy()
+    vertices[3, 0], vertices[7, 1] = far, -other
+    solid = sh.complete((vertices, ball.faces))
+    kept = ball.faces[~np.isin(ball.faces, [3, 7]).any(axis=1)]
+    middles = vertices[kept].mean(axis=1)
+    assert np.abs(solid.distance(middles)).max() < 1e-9 + 4 * np.spacing(other)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -72,3 +74,10 @@ def test_points_far_beyond_rounding_find_their_place_beside_near_ones():
     np.testing.assert_allclose(found.distances[40:], 1e100)
     for places in (found.places[:40], found.places[40:]):
         assert (np.einsum("ij,ij->i", places, ways) > 0.99).all()
+
+
+def test_no_tree_is_built_of_faces_without_extent():
+    with pytest.raises(sh.errors.SourceError):
+        FaceTree.of_triangles(np.ones((3, 3, 3)))
+    with pytest.raises(sh.errors.SourceError):
+        replace(sh.complete(sh.samples.sphere(1)), triangles=np.empty((0, 3, 3)))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -149,8 +151,7 @@ def welded(points: Floats, tolerance: float | Floats) -> Ints:
 
     Chains are not followed: a point is compared only with points that stand for themselves.
     """
-    smallest = float(np.nextafter(np.abs(points).max(initial=0.0), np.inf)) * 2.0**-60
-    return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), max(smallest, 1e-300)))
+    return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), 1e-300))
 
 
 def same_positions(points: Floats) -> Ints:
@@ -219,12 +220,13 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
     (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, 16.0 * tolerances  # few points are near cell walls
     for p in range(n):
         x, y, z = points[p, 0], points[p, 1], points[p, 2]
-        low = (np.floor((x - near_x) / side_x), np.floor((y - near_y) / side_y), np.floor((z - near_z) / side_z))
-        high = (np.floor((x + near_x) / side_x), np.floor((y + near_y) / side_y), np.floor((z + near_z) / side_z))
+        low_x, own_x, high_x = _cells_near(x, near_x, side_x)
+        low_y, own_y, high_y = _cells_near(y, near_y, side_y)
+        low_z, own_z, high_z = _cells_near(z, near_z, side_z)
         first = np.int32(-1)
-        for i in range(np.int64(low[0]), np.int64(high[0]) + 1):
-            for j in range(np.int64(low[1]), np.int64(high[1]) + 1):
-                for k in range(np.int64(low[2]), np.int64(high[2]) + 1):
+        for i in range(low_x, high_x + 1):
+            for j in range(low_y, high_y + 1):
+                for k in range(low_z, high_z + 1):
                     q = heads[mixed(i, j, k) & mask]
                     while q >= 0:
                         is_near = abs(points[q, 0] - x) <= near_x and abs(points[q, 1] - y) <= near_y
@@ -235,11 +237,23 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
             owner[p] = first
             continue
         owner[p] = p
-        i, j, k = np.int64(np.floor(x / side_x)), np.int64(np.floor(y / side_y)), np.int64(np.floor(z / side_z))
-        home = mixed(i, j, k) & mask
+        home = mixed(own_x, own_y, own_z) & mask
         following[p] = heads[home]
         heads[home] = p
     return owner
+
+
+@compiled
+def _cells_near(x: float, near: float, side: float) -> tuple[int, int, int]:
+    """Return the numbers of the cells of x − near, x and x + near.
+
+    Far away, coordinates that are near each other are equal, and have one number; others may have the same one.
+    """
+    cell = x / side
+    if abs(cell) < 2.0**52:
+        return np.int64(np.floor((x - near) / side)), np.int64(np.floor(cell)), np.int64(np.floor((x + near) / side))
+    own = np.int64(2.0**53 * math.frexp(cell)[0]) if abs(cell) < np.inf else np.int64(0)
+    return own, own, own
 
 
 @compiled

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
+from ..errors import SourceError
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from ..mesh.components import by_first_use, connected_components, sums_of
 from ..mesh.edges import EdgeTable, edge_table
@@ -148,7 +149,9 @@ class FaceTree:
 
     @classmethod
     def of(cls, features: FaceFeatures) -> FaceTree:
-        """Build the tree of some faces, of which there is at least one."""
+        """Build the tree of some faces; raise `SourceError` if there is none, since a search reads the first one."""
+        if not len(features.corners):
+            raise SourceError("no face of the shape has an extent", element="shape")
         triangles = features.corners.reshape(-1, 3, 3)
         return cls(features, BoxTree.in_order(*boxes_around(triangles), np.arange(len(triangles))))
 

@@ -120,6 +120,10 @@ class Solid(Displayed, Represented, Frozen):
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     uncrossed: bool = False
 
+    def __post_init__(self) -> None:
+        if not len(self.triangles):
+            raise SourceError("nothing is left of the shape", element="shape")
+
     @cached_property
     def features(self) -> FaceFeatures:
         """The triangles with their neighbourhoods; those that bound nothing are not regular."""
