@@ -47,7 +47,7 @@ def test_notes_have_no_exponents_in_percent_and_no_wrong_plurals():
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*(ROOT / "docs").glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"])
 DOCUMENTED = [(name, inspect.getdoc(thing) or "") for name, thing in [*PUBLIC, *methods()]]
-DIALECT = r"\b(turned|turns? (?=to|what|curves|faces)|pieces?|rims?|places?)\b"
+DIALECT = r"(?i)\b(turned|turns? (?=to|what|curves?|faces?|no|the)|pieces?|rims?|places?)\b"
 """Words for which the field has better ones: flipped, patches or strokes, boundary loops, points or positions."""
 
 

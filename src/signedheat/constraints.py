@@ -36,7 +36,7 @@ class Constraint(Protocol):
         divergence : (n,) float
             Right-hand side b: the integrated divergence of the unit vectors Y.
         source : SourceTerm
-            Places where φ is constrained, with weights and components.
+            Points where φ is constrained, with weights and components.
 
         Returns
         -------

@@ -326,9 +326,9 @@ def offset(
     shape : shape, several, or Solid
         A shape, broken or not; completed here unless it is a solid.
     distance : float, (n,) float or callable
-        Positive outside, negative inside. An array has a distance for each vertex of a mesh or point of a cloud, and is
-        interpolated linearly; a function maps (n, 3) points on the shape to distances. The grid has room for its values
-        at the vertices and at some thousand points between them.
+        Positive outside, negative inside, in the units of the shape. An array has a distance for each vertex of a mesh
+        or point of a cloud, and is interpolated linearly; a function maps (n, 3) points on the shape to distances. The
+        grid has room for its values at the vertices and at some thousand points between them.
     corners : {"round", "mitre", "sharp"}
         Shape of edges where offset faces move apart. With "round", they are rounded at the distance. Else they are
         mitred: the offset planes of the faces are extended up to two distances ("mitre", which keeps boxes) or ten

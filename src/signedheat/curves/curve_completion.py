@@ -66,7 +66,7 @@ def close_curves(
         Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them. With `EachComponent`
         and `LevelValues` curves are used as given.
     as_oriented : bool
-        Turn no curve, and leave none out.
+        Flip no curve, and leave none out.
     every_piece : bool
         Leave no curve out.
 

@@ -67,6 +67,9 @@ def piecewise_distance(
 ) -> Field[CutSurface]:
     """Signed distance to curves that need not bound a region, with jumps where no continuous distance exists.
 
+    A loop around the tube of a torus has no inside, as left and right of it are connected. No continuous function is
+    signed distance to it. This one jumps along the cut that costs least, away from the curves.
+
     Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
     triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
     the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the

@@ -247,7 +247,7 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
 def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, Ints]:
     """Read the triangles of a ``.step`` or ``.stp`` file, and the number of the CAD face that each is part of.
 
-    `Closest.faces` are triangles: the second array, taken at them, says on which CAD face the nearest point lies.
+    ``cad_faces[solid.closest(points).faces]`` are the CAD faces nearest to points, where no surface is completed.
 
     Parameters
     ----------

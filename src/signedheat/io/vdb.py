@@ -60,8 +60,7 @@ def write_vdb(field: Field[Grid], path: PathLike, half: bool = False) -> None:
     Parameters
     ----------
     field : Field
-        On a grid in space or in a band.
-        The field. Nodes without a value become inactive.
+        The field, on a grid in space or in a band. Nodes without a value become inactive.
     path : str or path
         The file; written under a temporary name and renamed.
     half : bool

@@ -154,11 +154,11 @@ def complete(
 ) -> Solid:
     """Complete a shape to the solid it represents, broken or not.
 
-    Faces are flipped to agree and to face outwards. Parts that bound something are closed by lids: thin plates that
-    continue the curvature around the hole, and are flat elsewhere. Points, and loose triangles that
-    scatter around a surface, are completed by the signed heat method. Bodies that overlap are united. Sheets bound
-    nothing: distance to them is positive on both sides. The result does not depend on where distance is wanted, nor on
-    rotation, position and scale.
+    Faces are flipped to agree and to face outwards. Parts that enclose a volume are closed by lids, patches that
+    continue the curvature of the surface around a hole. Points, and loose triangles that scatter around a surface, are
+    completed by the signed heat method. Bodies that overlap are united. Open sheets enclose nothing: distance to them
+    is positive on both sides. The result does not depend on where distance is wanted, nor on rotation, position and
+    scale.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def complete(
         Close meshes by lids, or by the zero set of φ where no face is, as in the paper (Feng & Crane 2024). With
         "none", all faces are a sheet: distance is unsigned, and only to what is there, as for clothes.
     lids : {"bent", "flat"}
-        Whether lids continue the bend of the surface, or are flat, as for half models, ducts and hulls.
+        Whether lids continue the curvature of the surface, or are flat, as for half models, ducts and hulls.
     as_oriented : bool
         Keep the orientation of faces and normals.
     keep_overlaps : bool
@@ -179,8 +179,9 @@ def complete(
         What bodies within others are. With "given", bodies or cavities, by their orientation. With "cavities",
         cavities, and bodies inside those, as in slicers. With "bodies", always bodies.
     seal : float, optional
-        Seal openings of meshes narrower than this length, to about a sixth of it, and fill what lies behind them: of
-        double skins, leaks, bodies within and rubbish, only what is reached from outside is left, as it was given.
+        Make solid: seal openings of meshes narrower than this length, to about a sixth of it, and fill what lies behind
+        them. Of double skins, leaks, bodies within and rubbish, only what is reached from outside is left, unchanged.
+        In the units of the shape, as all lengths.
     smallest : float, optional
         Leave out the connected parts of meshes that fit into a box whose diagonal is shorter than this length.
     constraint, diffusion : Constraint, float

@@ -105,7 +105,7 @@ def fill_holes(
     rims : int or sequence of int, optional
         Close only boundary loops through these vertices, including outlines of sheets.
     lids : {"bent", "flat"}
-        Whether lids continue the bend of the surface, or are flat, as in `complete`.
+        Whether patches continue the curvature of the surface, or are flat, as in `complete`.
 
     Returns
     -------

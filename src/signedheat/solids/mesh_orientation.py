@@ -40,28 +40,28 @@ class Orientation(Frozen, ShortRepr):
     turned : (k,) bool
         Which of them were flipped.
     parts : (k,) int
-        Piece of each face, connected across edges of two faces or closed as given; −1 for faces on fewer
+        Patch of each face, connected across edges of two faces or closed as given; −1 for faces on fewer
         than three distinct points, and inner walls.
     undecided : (k,) bool
         Faces of sheets, which bound nothing: they agree with their neighbours.
     inner : (k,) bool
         Walls between closed cells (see `inner_walls`), which bound nothing: left as they are.
     n_parts, closed_parts : int
-        Pieces, and those that close.
+        Patches, and those that close.
     turned_parts, turned_faces, turned_area : int, int, float
-        Pieces given facing inwards; faces flipped, and their share of the area.
+        Patches given facing inwards; faces flipped, and their share of the area.
     inconsistent_edges : int
         Edges across which two faces disagreed.
     nonmanifold_edges : int
         Edges of three or more faces, across which orientation is not carried on.
     nonorientable_parts : int
-        Pieces whose faces cannot agree, such as Möbius bands: left as they are.
+        Patches whose faces cannot agree, such as Möbius bands: left as they are.
     undecided_parts, undecided_area : int, float
-        Pieces that bound nothing, and their share of the area.
+        Patches that bound nothing, and their share of the area.
     merged_faces : int
         Duplicates left out.
     nested_bodies, cavities : int
-        Pieces within others: those that are bodies as well, and those that are walls of cavities.
+        Patches within others: those that are bodies as well, and those that are walls of cavities.
 
     See Also
     --------
@@ -121,12 +121,12 @@ def orientation(
     *,
     nested: Nesting = "given",
 ) -> Orientation | CurveOrientation:
-    """Orient a mesh, or curves on a surface, and say which faces or curves were flipped, merged and left.
+    """Orient a mesh, or curves on a surface, and say which faces or curves were flipped, merged and left out.
 
-    Vertices that coincide up to rounding count as one, and so do faces on the same corners. What is closed as given
-    stays as it is, or is flipped as a whole to face outwards. Other faces are made to agree across edges of two faces.
-    Walls between closed cells are left out (`inner_walls`). Gauss's formula decides which way the resulting patches
-    face, and which of them bound nothing.
+    Vertices that coincide up to rounding count as one, and so do faces on the same corners. A closed part whose faces
+    agree is kept, or flipped as a whole to face outwards. Other faces are made to agree with their neighbours across
+    edges of two faces. Walls between closed cells are left out (`inner_walls`). The winding numbers of all faces decide
+    which way each connected patch faces, and which patches are sheets that enclose nothing.
 
     Curves are flipped so that they bound a region together, the one with the shortest boundary where they leave gaps.
 
@@ -267,7 +267,7 @@ def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape)
 def orient(
     shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:
-    """Turn the faces of a mesh so that neighbours agree and every part points outwards; or curves so that they agree.
+    """Flip faces of a mesh so that neighbours agree and every part faces outwards, or curves so that they agree.
 
     `orientation` also says what was flipped.
 

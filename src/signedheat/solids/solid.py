@@ -277,7 +277,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         Closest
-            Places, distances, gradients, faces and confidence, in arrays of shape (...) or (..., 3).
+            Points, distances, gradients, faces and confidence, in arrays of shape (...) or (..., 3).
 
         Raises
         ------
