@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
-from .errors import FileFormatError, GeometryError, SignedHeatError, UnsupportedTypeError
+from .errors import FileFormatError, GeometryError, SignedHeatError, UnsupportedTypeError, counted
 from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -293,8 +293,8 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
     if len(outside):
         first = outside[0]
         raise GeometryError(
-            f"{len(outside)} {name} name a vertex that does not exist; number {first} is "
-            f"{ids[first].tolist()}, but vertex ids go from 0 to {n_vertices - 1}",
+            f"a vertex that does not exist is named by {counted(len(outside), name.removesuffix('s'))}; number {first} "
+            f"is {ids[first].tolist()}, but vertex ids go from 0 to {n_vertices - 1}",
             remedy=from_zero(ids, n_vertices, name),
             element=f"number {first}",
         )

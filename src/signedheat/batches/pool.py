@@ -32,7 +32,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, printable
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, counted, printable
 from ..io.files import move_into_place, replaceable, writing
 from ..io.shape_files import read, save
 from ..jobs import MOST_THREADS, Announcement, Progress, command_for, logger
@@ -307,7 +307,7 @@ class Batch:
 
     def __repr__(self) -> str:
         done = len(self.outcomes) - len(self.failures)
-        return f"Batch({done} of {len(self.outcomes)} shapes done, {self.skipped} of them before)"
+        return f"Batch({done} of {counted(len(self.outcomes), 'shape')} done, {self.skipped} of them before)"
 
 
 def run(
@@ -415,7 +415,7 @@ def run(
         stack.enter_context(closing(outcomes))
         begin, failed = time.perf_counter(), 0
         if progress is not None:
-            progress(skipped / len(shapes), f"{skipped} of {len(shapes)} shapes")
+            progress(skipped / len(shapes), f"{skipped} of {counted(len(shapes), 'shape')}")
         for n_ended, outcome in enumerate(outcomes, 1):
             done[outcome.name] = outcome
             manifest.add(outcome)
@@ -424,7 +424,7 @@ def run(
                 report(outcome)
             failed += not outcome.is_done
             if progress is not None:
-                text = f"{len(done)} of {len(shapes)} shapes"
+                text = f"{len(done)} of {counted(len(shapes), 'shape')}"
                 if failed:
                     text += f", {failed} not done"
                 n_left = len(todo) - n_ended

@@ -186,7 +186,7 @@ def watertight(arguments: Namespace) -> Summary:
         "failed": len(done.failures),
     }
     closed = len(done.outcomes) - len(done.failures)
-    return summary, f"{printable(str(done.manifest))}: {closed} of {len(done.outcomes)} shapes closed"
+    return summary, f"{printable(str(done.manifest))}: {closed} of {counted(len(done.outcomes), 'shape')} closed"
 
 
 def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:

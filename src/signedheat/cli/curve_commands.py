@@ -134,7 +134,7 @@ def surface(arguments: Namespace) -> Summary:
         sh.view.save_surface(field, arguments.preview, sources, arguments.contours or 20, up)
     text = f"{printable(arguments.output)}: {counted(len(field.values), 'vertex')}, φ from {low:.4g} to {high:.4g}"
     if summary["unreached"]:
-        text += f", {summary['unreached']} vertices without any source"
+        text += f", {counted(summary['unreached'], 'vertex')} without any source"
     if summary.get("completed"):
         text += f", {percent(summary['completed'])} of the curve completed"
     text = _with_pieces(field, summary, text)

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import Bools, Ints
 from ..constraints import Constraint, EachComponent, Free, LevelValues, Soft, ZeroSet
 from ..diagnostics import Note
-from ..errors import ConstraintError, InexactWarning, percent, warn_user
+from ..errors import ConstraintError, InexactWarning, counted, percent, warn_user
 from ..fields.field import Field
 from ..fields.sharpening import sharpen
 from ..jobs import Progress, growing, within
@@ -46,8 +46,9 @@ def warn_of_gaps(mesh: object) -> None:
     if len(gaps):
         warn_user(
             "boundary edges of the surface run along each other, less than "
-            f"{GAP_UNITS * 2.0**-24:.0e} of its size apart, at {len(gaps)} vertices, the first of them number "
-            f"{gaps[0]}: distance goes round the gap. Merge these vertices with those beside them if they are one",
+            f"{GAP_UNITS * 2.0**-24:.0e} of its size apart, at {counted(len(gaps), 'vertex')}, the first of them "
+            f"number {gaps[0]}: distance goes round the gap. Merge these vertices with those beside them if they are "
+            "one",
             InexactWarning,
         )
 

@@ -128,7 +128,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         unbalanced = int((edge_table(self._welded_faces).balance != 0).sum())
         if unbalanced:
             raise GeometryError(
-                f"the mesh is not closed: {unbalanced} edges are open, or the faces there disagree",
+                f"the mesh is not closed: at {counted(unbalanced, 'edge')} a face is missing, or faces disagree",
                 remedy="use sh.complete(mesh).volume",
                 element="faces",
             )
