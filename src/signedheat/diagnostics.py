@@ -167,14 +167,14 @@ class OutsideMesh(Note):
 class ShapeOriented(Note):
     """How the faces of a shape were oriented; the values are those of `Orientation`, areas as fractions of the area."""
 
-    turned_faces: int
-    turned_area: float
-    turned_parts: int
-    merged_faces: int
-    nonorientable_parts: int
-    undecided_area: float
-    nested_bodies: int
-    cavities: int
+    turned_faces: int = 0
+    turned_area: float = 0.0
+    turned_parts: int = 0
+    merged_faces: int = 0
+    nonorientable_parts: int = 0
+    undecided_area: float = 0.0
+    nested_bodies: int = 0
+    cavities: int = 0
     limits: ClassVar[Mapping[str, float]] = {"turned_faces": 0, "merged_faces": 0}
 
     def __str__(self) -> str:

@@ -12,6 +12,7 @@ import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
 from signedheat.diagnostics import BoundsNothing, CompletedArea, LeftOut, SmallParts
+from signedheat.solids import completion, union
 from signedheat.solids.completion import seam_triangles
 from signedheat.solids.overlaps import levels_within
 from signedheat.solids.winding import SUMMED_POINTS, open_edges_of
@@ -332,8 +333,8 @@ def test_a_block_of_cells_is_solid_whichever_way_its_walls_face():
     vertices, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     points = np.random.default_rng(1).uniform(-1, n + 1, (3000, 3))
     whole = sh.complete(box((n, n, n), n=1))
-    for completion in ("lids", "heat"):
-        solid = sh.complete((vertices, faces.reshape(-1, 3)), completion=completion)
+    for method in ("lids", "heat"):
+        solid = sh.complete((vertices, faces.reshape(-1, 3)), completion=method)
         np.testing.assert_allclose(solid.distance(points), whole.distance(points), atol=1e-12)
         assert (solid.origins >= 0).all()
 
@@ -685,3 +686,56 @@ def test_small_parts_are_left_out_by_their_size(scale):
         assert sh.complete(shape, smallest=1e-3 * scale).volume > solid.volume
     with pytest.raises(sh.errors.SourceError, match="all parts of the shape are smaller"):
         sh.complete(mesh, smallest=100 * scale)
+
+
+def as_polygons(mesh):
+    """The faces of a box as six squares."""
+    corners, _ = np.unique(np.round(mesh.vertices, 9), axis=0, return_inverse=True)
+    squares = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return sh.PolygonMesh(corners, squares)
+
+
+BALL = samples.sphere(2)
+CLEAN = {
+    "ball": BALL,
+    "far away": sh.TriangleMesh(BALL.vertices + 1e7, BALL.faces),
+    "without indices": samples.soup(BALL),
+    "box": sh.TriangleMesh(*box(n=1)),
+    "squares": as_polygons(sh.TriangleMesh(*box(n=1))),
+    "ring": samples.torus(1.0, 0.4, 24, 12),
+    "unused vertices": sh.TriangleMesh(np.concatenate([BALL.vertices, [[9, 9, 9]]]), BALL.faces),
+}
+OTHERS = {
+    "inwards": sh.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1]),
+    "open": sh.TriangleMesh(BALL.vertices, BALL.faces[1:]),
+    "twice": sh.TriangleMesh(BALL.vertices, np.concatenate([BALL.faces, BALL.faces])),
+    "two": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 5, BALL.faces)),
+    "crosses itself": samples.torus(0.4, 0.6, 24, 12),
+    "one turned": samples.with_flipped_faces(BALL, 0.01),
+    "flat": sh.TriangleMesh(BALL.vertices * [1, 1, 0], BALL.faces),
+}
+
+
+def same_solids(one, other):
+    assert np.array_equal(one.triangles, other.triangles)
+    assert np.array_equal(one.origins, other.origins) and np.array_equal(one.confidence, other.confidence)
+    assert np.array_equal(one.bounding, other.bounding) and one.uncrossed == other.uncrossed
+    assert np.array_equal(one.windings.triangles, other.windings.triangles)
+    assert (one.source is None) == (other.source is None)
+    assert [str(note) for note in one.diagnostics.notes] == [str(note) for note in other.diagnostics.notes]
+
+
+@pytest.mark.parametrize("name", list(CLEAN))
+@pytest.mark.parametrize("as_oriented", [False, True])
+def test_what_is_closed_and_clean_is_taken_as_everything_else_would_make_it(name, as_oriented, monkeypatch):
+    checked = sh.complete(CLEAN[name], as_oriented=as_oriented)
+    with monkeypatch.context() as patch:
+        patch.setattr(completion, "bounding", None)  # nothing is decided
+        same_solids(sh.complete(CLEAN[name], as_oriented=as_oriented), checked)
+    monkeypatch.setattr(completion, "solid_as_given", lambda _: None)
+    same_solids(sh.complete(CLEAN[name], as_oriented=as_oriented), checked)
+
+
+@pytest.mark.parametrize("name", list(OTHERS))
+def test_what_is_not_closed_and_clean_is_decided(name):
+    assert union.solid_as_given(OTHERS[name]) is None

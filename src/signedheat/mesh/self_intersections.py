@@ -9,8 +9,8 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, in_threads
-from .box_tree import BOXES_PER_LEAF, boxes_around, morton_codes
-from .turned_boxes import TurnedBoxes, boxes_apart, turned_apart
+from .box_tree import boxes_around, morton_codes
+from .turned_boxes import TRIANGLES_PER_LEAF, TurnedBoxes, boxes_apart, turned_apart
 from .unit_vectors import unit
 from .welding import same_positions, tolerances
 
@@ -136,7 +136,7 @@ def _pairs_of(tree: TurnedBoxes, triangles: Triangles, around: bool, node: int, 
             depth -= 1
             a, b = stack[depth, 0], stack[depth, 1]
             slack = min(largest[a, 6], largest[b, 6])
-            if a != b and (boxes_apart(largest, a, b, slack) or turned_apart(turned, a, b, slack)):
+            if a != b and (boxes_apart(largest, a, largest, b, slack) or turned_apart(turned, a, b, slack)):
                 continue
             if largest[a, 7] + largest[b, 7] <= 0.0:  # none asked for
                 continue
@@ -149,10 +149,12 @@ def _pairs_of(tree: TurnedBoxes, triangles: Triangles, around: bool, node: int, 
                         stack[depth, 0], stack[depth, 1] = 2 * a + i // 2, 2 * b + i % 2
                         depth += 1
                 continue
-            first, second = (a - leaves) * BOXES_PER_LEAF, (b - leaves) * BOXES_PER_LEAF
-            for f in range(first, min(first + BOXES_PER_LEAF, n)):
-                for g in range(f + 1 if a == b else second, min(second + BOXES_PER_LEAF, n)):
-                    if boxes_apart(own, f, g, slack) or own[f, 7] + own[g, 7] <= 0.0:
+            first, second = (a - leaves) * TRIANGLES_PER_LEAF, (b - leaves) * TRIANGLES_PER_LEAF
+            for f in range(first, min(first + TRIANGLES_PER_LEAF, n)):
+                if boxes_apart(own, f, largest, b, slack):
+                    continue
+                for g in range(f + 1 if a == b else second, min(second + TRIANGLES_PER_LEAF, n)):
+                    if boxes_apart(own, f, own, g, slack) or own[f, 7] + own[g, 7] <= 0.0:
                         continue
                     if (own[f, 8] >= 0.0 and own[f, 8] == own[g, 8]) != around:
                         continue

@@ -11,10 +11,12 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from .box_tree import BOXES_PER_LEAF, boxes_around
+from .box_tree import boxes_around
 from .triangles import area_vectors
 from .unit_vectors import unit
 
+TRIANGLES_PER_LEAF = 8
+"""Triangles in each leaf: comparing their boxes takes less time than descending further."""
 BOX_ROUNDING = 1e-12
 """Distance between turned boxes that may be rounding, relative to their sizes."""
 
@@ -26,7 +28,7 @@ class TurnedBoxes(NamedTuple):
     whether it is asked for, its hub or −1, and the opposite of that; or −∞ where there is nothing.
     """
 
-    own: Floats  # (leaves · BOXES_PER_LEAF, 10) what is known of each triangle
+    own: Floats  # (leaves · TRIANGLES_PER_LEAF, 10) what is known of each triangle
     largest: Floats  # (2 · leaves, 10) what is known of each node
     # (2 · leaves, 15) box along a large triangle below: centre, half the lengths of its sides, and their directions
     turned: Floats
@@ -34,8 +36,8 @@ class TurnedBoxes(NamedTuple):
     @classmethod
     def of(cls, corners: Floats, slacks: Floats, hubs: Ints, asked: Bools) -> TurnedBoxes:
         """Build the tree over (n, 9) corners."""
-        leaves = 1 << max(int(np.ceil(np.log2(len(corners) / BOXES_PER_LEAF))), 0)
-        own = np.full((BOXES_PER_LEAF * leaves, 10), -np.inf)
+        leaves = 1 << max(int(np.ceil(np.log2(len(corners) / TRIANGLES_PER_LEAF))), 0)
+        own = np.full((TRIANGLES_PER_LEAF * leaves, 10), -np.inf)
         lower, upper = boxes_around(corners.reshape(-1, 3, 3))
         for columns, values in zip(
             np.split(own[: len(corners)], [3, 6, 7, 8, 9], axis=1),
@@ -50,9 +52,9 @@ class TurnedBoxes(NamedTuple):
 def _axes(triangles: Floats, leaves: int) -> Floats:
     """Return (leaves, 9) directions along the longest side in each leaf, and across it; 0 where there are none."""
     sides = np.roll(triangles, -1, axis=1) - triangles
-    squares = np.zeros((BOXES_PER_LEAF * leaves, 3))
+    squares = np.zeros((TRIANGLES_PER_LEAF * leaves, 3))
     squares[: len(triangles)] = np.einsum("ncd,ncd->nc", sides, sides)
-    longest = 3 * BOXES_PER_LEAF * np.arange(leaves) + squares.reshape(leaves, -1).argmax(axis=1)
+    longest = 3 * TRIANGLES_PER_LEAF * np.arange(leaves) + squares.reshape(leaves, -1).argmax(axis=1)
     chosen = np.minimum(longest // 3, len(triangles) - 1)
     along = unit(sides[chosen, longest % 3])
     normals = unit(area_vectors(triangles[chosen]))
@@ -65,12 +67,12 @@ def _turned(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Floa
 
     Also fill in what is the `largest` of all below each node.
     """
-    leaves, points = len(axes), np.empty((16, 3))
+    leaves, points = len(axes), np.empty((max(16, 3 * TRIANGLES_PER_LEAF), 3))
     turned = np.zeros((2 * leaves, 15))
     for node in range(2 * leaves - 1, 0, -1):
-        count, wider, widest, first = 0, 0, -1.0, BOXES_PER_LEAF * (node - leaves)
+        count, wider, widest, first = 0, 0, -1.0, TRIANGLES_PER_LEAF * (node - leaves)
         if first >= 0:
-            for k in range(3 * first, 3 * min(first + BOXES_PER_LEAF, len(corners))):
+            for k in range(3 * first, 3 * min(first + TRIANGLES_PER_LEAF, len(corners))):
                 for d in range(3):
                     points[count, d] = corners[k // 3, k % 3 * 3 + d]
                 count += 1
@@ -87,7 +89,7 @@ def _turned(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Floa
                             points[count, d] += way if (k >> e) & 1 else -way
                     count += 1
         for k in range(10):
-            for i in range(BOXES_PER_LEAF if first >= 0 else 2):
+            for i in range(TRIANGLES_PER_LEAF if first >= 0 else 2):
                 value = own[first + i, k] if first >= 0 else largest[2 * node + i, k]
                 largest[node, k] = max(largest[node, k], value)
         for k in range(3):
@@ -109,10 +111,10 @@ def _turned(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Floa
 
 
 @compiled
-def boxes_apart(known: Floats, a: int, b: int, slack: float) -> bool:
+def boxes_apart(first: Floats, a: int, second: Floats, b: int, slack: float) -> bool:
     """Return whether boxes along the axes are farther apart than a slack: rows have upper and opposite lower ends."""
     for d in range(3):
-        if known[a, d] + known[b, 3 + d] < -slack or known[b, d] + known[a, 3 + d] < -slack:
+        if first[a, d] + second[b, 3 + d] < -slack or second[b, d] + first[a, 3 + d] < -slack:
             return True
     return False
 

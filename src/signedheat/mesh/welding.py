@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +35,11 @@ def part_sizes(points: Floats, labels: Ints, tails: Ints, heads: Ints) -> Floats
     has m faces: a single face that reaches far beyond all others does not count.
     """
     n = int(labels.max(initial=-1)) + 1
-    low, high = np.full((3, n), np.inf), np.full((3, n), -np.inf)
-    for axis in range(3):
-        np.minimum.at(low[axis], labels, points[:, axis])
-        np.maximum.at(high[axis], labels, points[:, axis])
-    lengths = np.abs(points[heads] - points[tails]).max(axis=1)
+    low, high, lengths = np.full((3, n), np.inf), np.full((3, n), -np.inf), np.zeros(len(tails))
+    for axis, along in enumerate(points.T.copy()):
+        np.minimum.at(low[axis], labels, along)
+        np.maximum.at(high[axis], labels, along)
+        np.maximum(lengths, np.abs(along[heads] - along[tails]), out=lengths)
     proper = lengths > 0
     owners = labels[tails[proper]]
     counts = np.bincount(owners, minlength=n)
@@ -68,7 +69,8 @@ def tolerances(points: Floats, faces: Ints, units: float) -> Floats:
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     labels = connected_components(len(points), tails, heads)
     sizes = part_sizes(points, labels, tails, heads)
-    last_places = ONE_PLACE * 2.0**-53 * np.abs(points).max(axis=1, initial=0.0)[faces].max(axis=1, initial=0.0)
+    largest = reduce(np.maximum, np.abs(points).T)
+    last_places = ONE_PLACE * 2.0**-53 * reduce(np.maximum, largest[faces.T])
     return np.maximum(units * sizes[labels[faces[:, 0]]], last_places)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
-from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note, SmallParts
+from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note, ShapeOriented, SmallParts
 from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
 from ..jobs import Progress, Stopwatch
 from ..linear.threads import one_blas_thread
@@ -46,7 +46,7 @@ from .regions import TOLERANCES
 from .rims import boundary, divided_at_rims, loops
 from .sealing import sealed
 from .solid import Solid
-from .union import TriangleGroup, united
+from .union import TriangleGroup, solid_as_given, united
 from .winding import Windings
 
 
@@ -268,18 +268,26 @@ def completed(
         with stopwatch("complete") as run:
             solid = run(partial(_from_points, cloud, method))
     else:
+        notes, owners = [] if options.as_oriented else [ShapeOriented()], owners_of(joined)
         with stopwatch("orient") as run:
-            triangles, cut_from = divided_at_rims(joined.triangulation)
-            owners = owners_of(joined)[cut_from]
-            chain = run(lambda: Chain.of(triangles))
-            decided = bounding(chain, options.nested, options.as_oriented)
-            notes = [] if options.as_oriented else [oriented_as(joined, owners, chain, decided).note]
-        if not chain.areas.any():
-            raise SourceError("all faces of the shape have zero area", element="shape")
-        chain = replace(chain)  # drops the cached properties that only `bounding` needs
+            by_lids = options.completion == "lids"
+            as_given = run(partial(solid_as_given, joined.triangulation)) if by_lids else None
+            if as_given is None:
+                triangles, cut_from = divided_at_rims(joined.triangulation)
+                owners = owners[cut_from]
+                chain = run(lambda: Chain.of(triangles))
+                decided = bounding(chain, options.nested, options.as_oriented)
+                if not options.as_oriented:
+                    notes = [oriented_as(joined, owners, chain, decided).note]
+                if not chain.areas.any():
+                    raise SourceError("all faces of the shape have zero area", element="shape")
+                chain = replace(chain)  # drops the cached properties that only `bounding` needs
         with stopwatch("complete") as run:
-            solid = run(partial(_from_mesh, triangles, chain, decided, options, method))
-            solid = _with_whole_boundary(solid, triangles)
+            if as_given is None:
+                solid = run(partial(_from_mesh, triangles, chain, decided, options, method))
+                solid = _with_whole_boundary(solid, triangles)
+            else:
+                solid = as_given
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))

@@ -19,8 +19,9 @@ from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..errors import GeometryError, OutsideError, SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
 from ..mesh.components import element_components, first_members
+from ..mesh.edges import edge_table
 from ..mesh.self_intersections import overlapping_faces
-from ..mesh.triangles import face_areas
+from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
 from ..parallel import PointTree
 from ..shapes.transforms import concatenated
@@ -50,6 +51,24 @@ class TriangleGroup:
         """Return the group of triangles that were not given; their vertices have negative numbers."""
         ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
+
+
+def solid_as_given(mesh: TriangleMesh) -> Solid | None:
+    """Return the solid of a mesh that is one closed surface, faces outwards and does not cross itself, or else None."""
+    points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
+    table = edge_table(faces)
+    is_closed = (table.face_counts == 2).all() and not table.balance.any()
+    if not is_closed or (faces == np.roll(faces, 1, axis=1)).any() or element_components(faces).any():
+        return None
+    triangles = points.take(faces, axis=0)
+    corners = triangles - triangles[0, 0]  # so that no digits cancel far away
+    vectors = area_vectors(corners)
+    if not vectors.any(axis=1).all() or np.einsum("ij,ij->", corners[:, 0], vectors) <= 0:
+        return None
+    if len(overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT))):
+        return None
+    every, sure = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
+    return Solid(triangles, np.arange(len(faces)), sure, every, Windings(triangles), mesh, uncrossed=True)
 
 
 def united(
