@@ -1,8 +1,8 @@
 """A relief with a base
 ====================
 
-A terrain is a sheet, which no printer takes. `extrude` gives it walls and a base at a height, or a lid; and makes a
-plate of outlines, whose holes go through.
+A terrain is a sheet, which no printer takes. `extrude` gives it a skirt, walls down to a base or up to a lid. Of
+outlines it makes a plate, whose holes go through.
 """
 
 import numpy as np
