@@ -194,8 +194,9 @@ def signed_distance(
     Returns
     -------
     Field
-        φ is negative inside shapes and filled outlines, and to the right of curves and strokes; positive on both sides
-        of sheets that bound nothing. ``diagnostics.notes`` say what was flipped, left out and completed.
+        φ, in the units of the source, is negative inside shapes and filled outlines, and to the right of curves and
+        strokes. It is positive on both sides of sheets, which bound nothing. ``diagnostics.notes`` say what was
+        flipped, left out and completed.
 
     Raises
     ------

@@ -125,7 +125,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
-        """Make a solver with another τ, which shares everything that does not depend on τ, such as the factor of C.
+        """Make a solver with another τ, which shares what does not depend on τ, such as the factorised Laplacian.
 
         Parameters
         ----------

@@ -19,7 +19,7 @@ class Closest:
     Attributes
     ----------
     distances : (...) float
-        Signed distances, negative inside.
+        Signed distances, negative inside, in the units of the shape.
     points : (..., 3) float
         The nearest points.
     faces : (...) int

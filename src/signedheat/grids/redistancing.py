@@ -57,7 +57,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
     Returns
     -------
     array of the same shape
-        Distances, with the signs of the values.
+        Distances, in the units of the spacing, with the signs of the values.
 
     Raises
     ------

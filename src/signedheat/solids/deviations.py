@@ -300,7 +300,7 @@ def deviation(
     Returns
     -------
     Deviation
-        Positive outside the part or in front of it, where there is too much material.
+        In the units of the scan; positive outside the part or in front of it, where there is too much material.
 
     Raises
     ------

@@ -54,6 +54,8 @@ class Filled:
 class FilledMesh(Filled, TriangleMesh):
     """Triangles whose holes were closed by `fill_holes`: those that were given, then new ones.
 
+    It is a `TriangleMesh` with the attributes ``origins``, ``filled`` and ``left``, which `fill_holes` describes.
+
     See Also
     --------
     fill_holes : Close holes, and leave the rest of a mesh as it is.
@@ -62,7 +64,9 @@ class FilledMesh(Filled, TriangleMesh):
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class FilledPolygonMesh(Filled, PolygonMesh):
-    """Polygons whose holes were closed: those that were given, then triangles.
+    """Polygons whose holes were closed by `fill_holes`: those that were given, then triangles.
+
+    It is a `PolygonMesh` with the attributes ``origins``, ``filled`` and ``left``, which `fill_holes` describes.
 
     See Also
     --------

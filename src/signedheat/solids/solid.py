@@ -204,7 +204,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         (...) float
-            One number for each point.
+            Distances, in the units of the shape.
 
         Raises
         ------
