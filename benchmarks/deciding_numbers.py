@@ -21,7 +21,7 @@ import numpy as np
 from every_number import changed_to, set_everywhere
 from numpy.typing import NDArray
 
-from signedheat import TriangleMesh, complete, orientation, samples
+from signedheat import Polyline, TriangleMesh, complete, morphology, orientation, samples
 from signedheat.mesh import welding
 from signedheat.mesh.components import element_components
 from signedheat.mesh.triangles import area_vectors
@@ -320,36 +320,41 @@ def leaky(rng: Random, mesh: TriangleMesh, radius: float, n: int = 12) -> Triang
     )
 
 
+def grooved(angle: float) -> TriangleMesh:
+    """A block with a groove of an angle in degrees, half as deep as it is high."""
+    half = 0.5 * np.tan(np.radians(angle / 2))
+    outline = [[-1, 0], [1, 0], [1, 1], [half, 1], [0, 0.5], [-half, 1], [-1, 1]]
+    return morphology.extrude(Polyline(outline, closed=True), 1.0)
+
+
+def with_square_hole(size: float) -> TriangleMesh:
+    """A box of two skins, 2 wide, with a square hole of a size through both at the top."""
+    made = []
+    for half in (1.0, 0.95):
+        rings = [w * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) for w in (half, 0.5 * size)]
+        points = np.column_stack([np.concatenate(rings), np.full(8, half)])
+        frame = [[k, (k + 1) % 4, 4 + (k + 1) % 4] for k in range(4)]
+        frame += [[k, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
+        skin = samples.union(sides((2 * half,) * 3, (5,), (-half,) * 3), TriangleMesh(points, frame))
+        made.append(skin if half == 1.0 else reversed_faces(skin))
+    return samples.union(*made)
+
+
 def filled_by_seals(seeds: int) -> dict[str, float]:
-    """Mean error of the volume that is filled by seals of 0.25, of bodies about 2 wide."""
-    box_of = {size: sides((size, size, size), (), 3 * (-size / 2,)) for size in (2.0, 1.9)}
-    whole = {
-        "ball": (samples.sphere(4), samples.sphere(4, radius=0.94)),
-        "torus": (
-            samples.torus(1.0, 0.5, n_around=96, n_across=48),
-            samples.torus(1.0, 0.45, n_around=96, n_across=48),
-        ),
-        "box": (box_of[2.0], box_of[1.9]),
-    }
-    corner = samples.union(sides((2, 1, 1)), sides((0.6, 0.5, 1.5), (), (0.4, 0.25, 0.5)))
-    result = {}
-    for name, (outer, inner) in whole.items():
-        volume = complete(outer).volume
-        given = {
-            "two skins": lambda _, outer=outer, inner=inner: samples.union(outer, reversed_faces(inner)),
-            "leaks of 0.08": lambda rng, outer=outer, inner=inner: leaky(rng, samples.union(outer, inner), 0.04),
-            "leaks of 0.16": lambda rng, outer=outer, inner=inner: leaky(rng, samples.union(outer, inner), 0.08),
-            "rubbish within": lambda rng, outer=outer: leaky(
-                rng, samples.union(outer, samples.sphere(2, 0.1, (0.9, 0.1, 0.1))), 0.04
-            ),
-        }
-        for kind, make in given.items():
-            volumes = [complete(make(np.random.default_rng(k)), seal=0.25).volume for k in range(seeds)]
-            result[f"{name}, {kind}"] = float(np.mean(np.abs(np.array(volumes) / volume - 1)))
-    result["corner of two boxes"] = abs(complete(corner, seal=0.25).volume / (2 + 0.6 * 0.5) - 1)
-    cup = samples.union(part_of(samples.sphere(4), lambda at: at[:, 2] < 0.6), reversed_faces(
-        part_of(samples.sphere(4, radius=0.9), lambda at: at[:, 2] < 0.6)))  # fmt: skip
-    result["a cup stays open"] = float(complete(cup, seal=0.25).inside([0.0, 0.0, 0.0]))
+    """Error of the volume that is filled by seals of 0.25, relative to what it should be, of bodies about 2 wide."""
+    ball, result = samples.sphere(4), {}
+    volume = complete(ball).volume
+    for apart in (0.06, 0.001):
+        two = samples.union(ball, reversed_faces(samples.sphere(4, radius=1 - apart)), samples.sphere(2, 0.2))
+        for width in (0.08, 0.16):
+            found = [complete(leaky(np.random.default_rng(k), two, width / 2), seal=0.25).volume for k in range(seeds)]
+            result[f"skins {apart} apart, leaks of {width}"] = float(np.mean(np.abs(np.array(found) / volume - 1)))
+    for angle in (120.0, 75.0, 60.0):
+        groove = grooved(angle)
+        result[f"groove of {angle:g}°"] = abs(complete(groove, seal=0.25).volume / groove.volume - 1)
+    for size, is_sealed in ((0.2, True), (0.23, True), (0.27, False), (0.3, False)):
+        inside = complete(with_square_hole(size), seal=0.25).inside([0.0, 0.0, 0.0])
+        result[f"hole of {size}, which {'is' if is_sealed else 'is not'} sealed"] = float(bool(inside) != is_sealed)
     return result
 
 

@@ -155,7 +155,7 @@ def distance_to_pieces(
         reason = (
             f"{share:.0%} of the length of the curves was left out, as it bounds nothing with the others: "
             f"{named(numbers[left_out])}. Draw what is missing; every_piece=True takes all curves, and "
-            'completion="none" measures unsigned distance to all, as to roads with junctions'
+            'completion="none" measures unsigned distance, as to roads with junctions'
         )
     if len(loops) and not reason:
         reason = (
@@ -227,7 +227,10 @@ def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence
     `field` is the distance, completed by heat, to the curves that were not left out. `curves` are all curves given,
     which the warning calls by their `numbers`, (n,).
     """
-    as_given = "as_oriented=True takes curves as they are"
+    as_given = (
+        'as_oriented=True takes curves as they are, and completion="none" measures unsigned distance, as to roads with '
+        "junctions"
+    )
     if decision.bounds_nothing:
         return (
             "most of the curves bound nothing together: which side is which away from them is a guess. Draw what is "
@@ -242,7 +245,7 @@ def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence
     if decision.tied:
         return (
             "the curves bound something else as well: which of the two is meant is a guess. Draw what is missing, or "
-            f"turn curves that face the wrong way; {as_given}"
+            f"flip curves that run the wrong way; {as_given}"
         )
     doubtful = numbers[decision.worth_little()]
     if len(doubtful):
