@@ -12,8 +12,8 @@ from PIL import Image, ImageOps
 
 TRADES = {
     "Repair and printing": (
-        "watertight_scan made_solid filled_holes offset_of_a_broken_sphere overlapping_bodies turned_faces print_shell "
-        "hollow_model sections_and_cuts relief_with_a_base wall_thickness thin_plates open_sheets "
+        "watertight_scan made_solid filled_holes offset_of_a_broken_sphere overlapping_bodies flipped_faces "
+        "print_shell hollow_model sections_and_cuts relief_with_a_base wall_thickness thin_plates open_sheets "
         "sharp_contours grow_and_shrink"
     ),
     "Distance for learning": (
@@ -26,7 +26,7 @@ TRADES = {
     "Drawings and maps": "broken_letter toolpaths rounding_a_drawing floor_plan coastline terrain_from_contours",
     "Masks": "mask_and_back distance_on_voxels grid_of_your_own",
     "Surfaces and tets": (
-        "curve_distance curve_design distance_from_points shortest_paths turned_pieces curve_across_polygons "
+        "curve_distance curve_design distance_from_points shortest_paths flipped_strokes curve_across_polygons "
         "curve_on_a_point_cloud distance_that_jumps distance_on_bad_triangles intrinsic_triangles wall_distance "
         "distance_on_tets distance_round_corners"
     ),

@@ -1,7 +1,7 @@
 """A coastline with gaps, on the globe
 ===================================
 
-A whole application: distance from a coast given in pieces of longitude and latitude, with gaps between them: positive
+A whole application: distance from a coast given in lines of longitude and latitude, with gaps between them: positive
 on land, to the left of the coast, negative at sea.
 """
 
@@ -12,7 +12,7 @@ from signedheat import samples, view
 
 
 def direction(longitude: float, latitude: float) -> np.ndarray:
-    """The unit vector to a place, from angles in degrees."""
+    """The unit vector to a point, from angles in degrees."""
     lon, lat = np.radians([longitude, latitude])
     return np.array([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
 
@@ -30,7 +30,7 @@ whole = sh.close_curves(pieces, globe)
 eye = direction(-50.0, 25.0)
 view.save_row(
     [
-        ("the pieces, and distance from the coast", phi, {"sources": pieces, "view": eye}),
+        ("the lines, and distance from the coast", phi, {"sources": pieces, "view": eye}),
         ("the coast, closed", phi, {"sources": whole, "view": eye}),
     ],
     "coastline.png",

@@ -30,6 +30,6 @@ view.save_row(
 )
 
 # %%
-# Deepest place of the dent:
+# Deepest point of the dent:
 measured = float(found.distances.min())
 print(f"{measured:.4g}")

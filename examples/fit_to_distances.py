@@ -1,7 +1,7 @@
 """A mesh fitted to distances
 =============================
 
-Distances were measured at 2,000 places around a body that nobody has seen. A ball takes its shape: PyTorch descends
+Distances were measured at 2,000 points around a body that nobody has seen. A ball takes its shape: PyTorch descends
 along the gradient of the misfit by the vertices of the ball, which `sh.torch.distance` knows.
 """
 

@@ -2,7 +2,7 @@
 ===========================
 
 Slivers of a CAD part, and the triangles on the same surface on which the method runs: their edges run along the
-surface, across the faces. Both are drawn on the pieces that they have in common.
+surface, across the faces. Both are drawn on the polygons that they have in common.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Shortest paths
 ==============
 
-Exact geodesics on a bumpy surface: between vertices, and from a curve to the places that are farthest from it.
+Exact geodesics on a bumpy surface: between vertices, and from a curve to the vertices that are farthest from it.
 """
 
 import numpy as np

@@ -12,16 +12,16 @@ from signedheat import samples, view
 shape = samples.with_flipped_faces(samples.sphere(4), 0.5)
 grid = sh.Grid.around(shape.bounds, 48)
 plain, mended = sh.sharpen(sh.SignedHeatSolver(grid).distance(shape)), sh.signed_distance(shape, grid)
-turned = sh.orientation(shape).turned_faces
+flipped = sh.orientation(shape).turned_faces
 
 view.save_row(
     [
         ("half of the faces flipped (red)", shape),
-        (f"sh.orient: {turned} flipped back", sh.orient(shape)),
+        (f"sh.orient: {flipped} flipped back", sh.orient(shape)),
         ("as they were given", plain, {"shape": shape, "across": (1,)}),
         ("signed_distance", mended, {"shape": shape, "across": (1,)}),
     ],
-    "turned_faces.png",
+    "flipped_faces.png",
 )
 
 # %%
