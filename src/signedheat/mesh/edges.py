@@ -63,13 +63,8 @@ def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | No
         tails, np.roll(faces, -1, axis=1).ravel(), n_vertices, None if used is None else used[owners]
     )
     two = pairs.counts == 2
-    first, second = pairs.first[two], pairs.second[two]
-    return agreeing(owners[first], owners[second], tails[first] == tails[second], weights)
-
-
-def agreeing(first: Ints, second: Ints, disagree: Bools, weights: Floats) -> FaceOrientation:
-    """Find which faces to turn so that pairs of faces agree; in each part, the larger weight stays as it is."""
-    n = len(weights)
+    disagree = tails[pairs.first[two]] == tails[pairs.second[two]]
+    first, second, n = owners[pairs.first[two]], owners[pairs.second[two]], len(weights)
     parts = connected_components(n, first, second)
     # the graph has each face f twice, as it is, f, and turned over, f + n: faces that agree are connected
     over = np.where(disagree, second + n, second), np.where(disagree, second, second + n)

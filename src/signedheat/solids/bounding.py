@@ -25,7 +25,7 @@ from ..search.winding_tree import WindingTree
 from .chain import Chain
 from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces
-from .readings import Reading, as_given, mixed, odd, once, once_around, unexplained
+from .readings import Reading, as_given, mixed, once, unexplained
 from .rims import meeting_edges, open_edges
 
 LEAST_GAIN = 0.1
@@ -120,23 +120,22 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
     agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
     outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
-    by_odd, by_once, around = odd(chain), once(chain), once_around(chain)
+    by_once = once(chain)
     # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
     doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
     as_cavities = "cavities" if nested == "given" else nested
     trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
         (agreeing, differs(agreeing, given), WELL_EXPLAINED, True, nested),
-        (by_odd, differs(by_odd, given) & differs(by_odd, by_once), WELL_EXPLAINED, True, nested),
         (by_once, doubtful, WELL_EXPLAINED, True, nested),
-        (around, differs(around, by_odd) & differs(around, by_once), WELL_EXPLAINED, True, nested),
         (outwards, differs(outwards, agreeing), WELL_EXPLAINED, True, nested),
         (by_once, doubtful, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
         (by_once, doubtful, MOSTLY_WRONG, True, as_cavities),
     )
     overlapping = False
-    for number, (reading, told, least, united, nesting) in enumerate(trials):
+    for reading, told, least, united, nesting in trials:
         todo = told & (missing >= least)
-        if not todo.any() or (number > 4 and not overlapping):
+        again = any(reading is each for each in readings)  # in another way, which matters where bodies overlap
+        if not todo.any() or (again and not overlapping):
             continue
         readings.append(reading)
         best = float(part_areas @ missing), decided, chosen, missing

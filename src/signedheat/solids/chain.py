@@ -7,14 +7,14 @@ off its faces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, element_components, next_in_groups
-from ..mesh.edges import EdgeTable, FaceOrientation, agreeing, edge_keys, edge_table, orient_faces, pair_halfedges
+from ..mesh.edges import EdgeTable, FaceOrientation, edge_keys, edge_table, orient_faces, pair_halfedges
 from ..mesh.triangles import area_vectors, face_areas, part_volumes
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, joined_rims, same_positions
@@ -155,18 +155,9 @@ class Chain(Frozen):
         parts, volumes = part_volumes(self.positions, np.where(turned, self.given[:, ::-1], self.given))
         return np.asarray(reversed != (volumes < 0)[parts])
 
-    def agreeing_across_pairs(self, used: Bools) -> FaceOrientation:
+    def agreeing(self, used: Bools) -> FaceOrientation:
         """Turn triangles so that those agree that share an edge with no third one."""
         return orient_faces(self.faces, self.areas * np.sign(self.multiplicities), len(self.positions), used)
-
-    def agreeing(self, used: Bools) -> FaceOrientation:
-        """Turn neighbours so that they run opposite ways; most of the area of each piece stays as given."""
-        one, other = self.neighbors(used)
-        forward = self.edges.forward.ravel()
-        weights = self.areas * np.sign(self.multiplicities)
-        disagree = forward[one] == forward[other]
-        agreed = agreeing(one // 3, other // 3, disagree, weights)
-        return replace(agreed, disagreeing=len(np.unique(self.edges.face_edges.ravel()[one[disagree]])))
 
 
 def _without_folds(points: Floats, faces: Ints, joined: Ints) -> Ints:

@@ -1,11 +1,10 @@
 """Readings of a shape: which of its triangles count, how often, and which way they run.
 
 A broken shape can be read in more than one way. *As given* changes nothing: triangles count as often as they are
-there, and what is there once each way cancels. *Odd* takes triangles that are there an odd number of times, and turns
-them to agree: around an edge of two, four, ... triangles the winding number returns, so that neighbours run opposite
-ways. *Once* takes each triangle once, but for walls between closed cells. Both look at places alone. The indices of a
-mesh say more where bodies touch: *as given* is also read once triangles agree that share an edge by index, and once
-what is connected by index faces outwards.
+there, and what is there once each way cancels. The indices of a mesh say more where bodies touch: *as given* is also
+read once triangles agree that share an edge by index, and once what is connected by index faces outwards. *Once* looks
+at places alone: it takes each triangle once, but for walls between closed cells, and turns those to agree that share an
+edge with no third one.
 
 A reading is judged by the share of the area that it leaves unexplained. The winding number is a whole number on both
 sides of a face that bounds a solid, and at least 1 behind it; a face that does not count lies inside.
@@ -20,7 +19,6 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..mesh.components import connected_components
-from ..mesh.edges import FaceOrientation
 from ..mesh.triangles import cone_volumes
 from ..search.winding_tree import OFF_FACE, WindingTree, steps_off
 from .chain import Chain
@@ -85,30 +83,14 @@ def _one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
     return np.asarray((closes & (ahead | back))[chain.complexes])
 
 
-def odd(chain: Chain) -> Reading:
-    """Read a chain by its triangles that are there an odd number of times, turned to agree."""
-    used = chain.copies % 2 == 1
-    return _read(chain, used, chain.agreeing(used))
-
-
 def once(chain: Chain) -> Reading:
     """Read each triangle once, without walls between closed cells, turned to agree across edges of two of them."""
     used = ~walls(chain)
-    return _read(chain, used, chain.agreeing_across_pairs(used))
-
-
-def once_around(chain: Chain) -> Reading:
-    """Read each triangle once, without walls, turned to agree around edges of two, four, ... triangles."""
-    used = ~walls(chain)
-    return _read(chain, used, chain.agreeing(used))
-
-
-def _read(chain: Chain, used: Bools, agreed: FaceOrientation) -> Reading:
-    """Read the used triangles of a chain as they agree."""
+    agreed = chain.agreeing(used)
     counts = np.where(agreed.turned, -1, 1) * (agreed.orientable[agreed.parts] & used)
     nothing = np.zeros(len(counts), dtype=bool)
-    pieces, turned = agreed.parts, agreed.turned & used
-    return Reading(counts, turned, pieces, agreed.orientable, agreed.disagreeing, chain.reversed, nothing)
+    turned = agreed.turned & used
+    return Reading(counts, turned, agreed.parts, agreed.orientable, agreed.disagreeing, chain.reversed, nothing)
 
 
 def walls(chain: Chain) -> Bools:
