@@ -12,12 +12,10 @@ from shapes.grid_cases import assert_closed_manifold
 from shapes.triangulated import grid
 from signedheat import samples
 from signedheat.errors import InexactWarning
-from signedheat.mesh.arrangement import SAME_POINT, Arrangement, arranged
 from signedheat.mesh.pinches import separated
-from signedheat.mesh.welding import indexed, tolerances
+from signedheat.mesh.welding import indexed
 from signedheat.solids import kept_faces
-from signedheat.solids.bodies import Bodies, crossing_faces, is_whole_cut, same_solid, whole_boundary
-from signedheat.solids.regions import Regions
+from signedheat.solids.bodies import Bodies, crossing_faces, same_solid, whole_boundary
 from signedheat.solids.winding import Windings
 
 BARS = [
@@ -128,27 +126,6 @@ def test_the_proof_fails_for_any_other_solid():
         "another body within": np.concatenate([whole, corners(bump)]),
     }
     assert {name: same_solid(triangles, windings) for name, triangles in wrong.items()} == dict.fromkeys(wrong, False)
-
-
-def test_only_a_whole_cut_is_a_proof():
-    """Sides agree around all edges, no two pieces cross, and what bounds the inside is closed."""
-    parts, volume = overlapping()
-    points, faces = indexed(corners(*parts))
-    windings, slacks = Windings(points[faces]), tolerances(points, faces, SAME_POINT)
-    cut = arranged(points, faces, None, slacks)
-    regions, every = Regions.of(cut, windings, slacks), np.ones(len(cut.faces), dtype=bool)
-    whole = cut.points[cut.faces[regions.bounds]]
-    assert is_whole_cut(cut, regions, slacks, every)
-    assert same_solid(whole, windings) and volume_of(whole) == pytest.approx(volume, rel=1e-12)
-    uncut = Arrangement(points, faces, np.arange(len(faces)), np.arange(len(faces)))
-    as_they_are = replace(
-        Regions.of(uncut, windings, slacks), behind=every[: len(faces)], ahead=~every[: len(faces)], contradictions=0
-    )
-    assert not is_whole_cut(uncut, as_they_are, slacks, every[: len(faces)])
-    assert not is_whole_cut(cut, replace(regions, contradictions=1), slacks, every)
-    lost = regions.behind.copy()
-    lost[np.argmax(regions.bounds)] = False
-    assert not is_whole_cut(cut, replace(regions, behind=lost), slacks, every)
 
 
 def test_faces_that_a_cut_lost_come_back():

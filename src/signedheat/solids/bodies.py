@@ -1,13 +1,12 @@
 """The boundary of a solid as closed triangles, proven equal to the solid of its chain.
 
-The winding numbers of a closed chain say what is inside. The pieces of its cut that bound the inside are the boundary
-if they are closed, no two pieces cross, and sides agree around all edges. Other triangles bound the same solid if they
-are closed, and if on both sides of all triangles of both their own winding number is 1 inside and 0 outside. Where the
-cut of a chain fails these proofs, other ways to unite its bodies are tried. Bodies are the parts of the mesh that are
-closed as given, or what remains connected of the chain where the surfaces that meet along its edges are separated. If
-none passes through itself, manifold3d unites them: its result is closed however flat the angles are at which faces
-cross, and however close they lie. Otherwise the cut is cut again, and what is left open, which is thinner than what it
-merges, is closed by cones.
+The winding numbers of a closed chain say what is inside. Triangles bound the same solid if they are closed, and if on
+both sides of all triangles of both their own winding number is 1 inside and 0 outside. Where the cut of a chain fails
+that proof, other ways to unite its bodies are tried. Bodies are the parts of the mesh that are closed as given, or what
+remains connected of the chain where the surfaces that meet along its edges are separated. If none passes through
+itself, manifold3d unites them: its result is closed however flat the angles are at which faces cross, and however close
+they lie. Otherwise the cut is cut again, and what is left open, which is thinner than what it merges, is closed by
+cones.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
+from ..mesh.arrangement import SAME_POINT, arranged
 from ..mesh.edges import edge_table, orient_faces
 from ..mesh.pinches import separated
 from ..mesh.self_intersections import overlap, overlapping_faces
@@ -31,7 +30,7 @@ from ..mesh.welding import ONE_PLACE, coincident_faces, indexed, same_positions,
 from ..packages import lazy_module
 from ..surfaces.triangle_mesh import TriangleMesh
 from .closing import fan
-from .regions import TOLERANCES, Regions, cut_and_sided
+from .regions import TOLERANCES, cut_and_sided
 from .winding import Windings
 
 manifold3d: Any = lazy_module("manifold3d", "unions of bodies")
@@ -213,18 +212,6 @@ def _simple_loops(edges: Ints) -> Iterator[Ints]:
             for passed in loop[1:]:
                 del places[passed]
             del path[places[vertex] + 1 :]
-
-
-def is_whole_cut(pieces: Arrangement, regions: Regions, slacks: Floats, closing: Bools) -> bool:
-    """Whether the pieces of a cycle that bound its inside are known to bound the same solid, without any sample.
-
-    That is so if the sides of pieces agree around all edges, no two of the (p,) `closing` pieces cross deeper than
-    merging explains, given the (m,) slacks of the faces that were cut, and those that bound the inside are closed.
-    """
-    if regions.contradictions or edge_table(pieces.faces[regions.bounds & closing]).balance.any():
-        return False
-    depths = TOLERANCES[-1] * slacks[pieces.origins[closing]]
-    return not len(crossing_faces(pieces.points, pieces.faces[closing], depths))
 
 
 def same_solid(triangles: Floats, windings: Windings) -> bool:

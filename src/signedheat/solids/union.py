@@ -26,7 +26,7 @@ from ..mesh.welding import indexed, same_positions, tolerances
 from ..parallel import PointTree
 from ..shapes.transforms import concatenated
 from ..surfaces.triangle_mesh import TriangleMesh
-from .bodies import is_whole_cut, same_solid
+from .bodies import same_solid
 from .regions import cut_and_sided
 from .sections import Plane
 from .solid import Solid, completed_area, still_true
@@ -99,16 +99,15 @@ def united(
     diagnostics = Diagnostics(notes=(*notes, *_notes(triangles, origins, kept, buried & ~kept, bounds)))
     bounding = bounds & behind
     if not (uncut and bounding.all()):
-        proven = is_whole_cut(pieces, regions, slacks, closes)
-        windings = _windings_of(triangles[bounding], windings, proven)
+        windings = _windings_of(triangles[bounding], windings)
     triangles = triangles if kept.all() else triangles[kept]
     uncrossed = uncut and pieces.points is places  # no two of them met
     return Solid(triangles, origins[kept], confidence, bounding[kept], windings, None, diagnostics, uncrossed)
 
 
-def _windings_of(triangles: Floats, given: Windings, proven: bool) -> Windings:
+def _windings_of(triangles: Floats, given: Windings) -> Windings:
     """Return the winding numbers of what bounds the inside; the given ones if it is not the same solid."""
-    if np.array_equal(triangles, given.triangles) or not (proven or same_solid(triangles, given)):
+    if np.array_equal(triangles, given.triangles) or not same_solid(triangles, given):
         return given
     return Windings(triangles)
 
@@ -281,6 +280,5 @@ def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None)
     if a.source is not None and b.source is not None:
         source = TriangleMesh(*concatenated([(mesh.vertices, mesh.faces) for mesh in (a.source, b.source)]))
     notes = still_true((*a.diagnostics.notes, *b.diagnostics.notes), pieces, origins[parents] < 0)
-    proven = is_whole_cut(cut, regions, slacks, every[cut.origins])
-    bounding, windings = np.ones(len(pieces), dtype=np.bool_), _windings_of(pieces, windings, proven)
+    bounding, windings = np.ones(len(pieces), dtype=np.bool_), _windings_of(pieces, windings)
     return Solid(pieces, origins[parents], confidence[parents], bounding, windings, source, Diagnostics(notes=notes))
