@@ -75,6 +75,68 @@ class Bounding(Frozen):
         return np.asarray((chain.numbers >= 0) & (ways != turned))
 
 
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Connected parts of a chain that are not whole as given; loose triangles, which tell little, are one part."""
+
+    chain: Chain
+    whole: Bools  # (m,) which triangles are in none
+    pieces: Ints  # (m,) piece, as given, of each triangle; −1 where it is in none
+    of_pieces: Ints  # (q,) part of each piece
+    of_triangles: Ints  # (m,) part of each triangle, or −1
+    areas: Floats  # (p,) areas
+
+    @classmethod
+    def of(cls, chain: Chain, given: Reading) -> _Parts:
+        """Find the parts of a chain as it was given."""
+        whole, pieces = given.whole, np.full(len(given.whole), -1)
+        names, pieces[~whole] = np.unique(given.pieces[~whole], return_inverse=True)
+        loose = np.bincount(chain.complexes)[chain.complexes] == 1
+        firsts = first_members(given.pieces, len(given.orientable))[names]
+        of_pieces = np.unique(np.where(loose, -1, chain.complexes)[firsts], return_inverse=True)[1]
+        of_triangles = np.where(whole, -1, of_pieces[pieces])
+        areas = np.bincount(of_triangles[~whole], chain.areas[~whole]).astype(np.float64)
+        return cls(chain, whole, pieces, of_pieces, of_triangles, areas)
+
+    def missing(self, decided: Bounding) -> Floats:
+        """(p,) share of the area of each part that is unexplained."""
+        areas = np.bincount(self.pieces[~self.whole], self.chain.areas[~self.whole]).astype(np.float64)
+        return means(unexplained(self.chain, decided.counts, self.pieces), self.of_pieces, areas, len(self.areas))
+
+    def changed(self, decided: Bounding, other: Bounding) -> Floats:
+        """(p,) share of the area of each part that counts in another way."""
+        rows = np.flatnonzero(~self.whole & (decided.counts != other.counts))
+        areas = np.bincount(self.of_triangles[rows], self.chain.areas[rows], len(self.areas))
+        return np.asarray(areas / np.maximum(self.areas, 1e-300))
+
+    def differ(self, one: Reading, other: Reading) -> Bools:
+        """(p,) whether two readings count, or connect, triangles of each part in different ways."""
+        firsts = [first_members(reading.pieces, len(reading.orientable))[reading.pieces] for reading in (one, other)]
+        rows = np.flatnonzero(~self.whole & ((one.counts != other.counts) | (firsts[0] != firsts[1])))
+        return mask_of(len(self.areas), self.of_triangles[rows])
+
+    def entangled(self) -> Bools:
+        """(p,) whether the box around each part meets that of another part."""
+        low, high = (np.full((len(self.areas) + 1, 3), end) for end in (np.inf, -np.inf))
+        np.minimum.at(low, self.of_triangles, self.chain.triangles.min(axis=1))
+        np.maximum.at(high, self.of_triangles, self.chain.triangles.max(axis=1))
+        low, high = low[:-1], high[:-1]  # the last one has the whole triangles
+        starts, _ = BoxTree.of(low, high).meeting(np.stack([low, high, high], axis=1))
+        return np.asarray(np.diff(starts) > 1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    """A reading to try, for some parts."""
+
+    reading: Reading
+    parts: Bools  # (p,) parts that it may explain
+    least: float = WELL_EXPLAINED  # share of a part that must be unexplained for it to be tried
+    united: bool = True  # whether open bodies that overlap are united; else they are one body's outside and inside
+    nested: Nesting | None = None  # how closed pieces within others face, if not as asked for
+    overlaps: bool = False  # whether it is tried only where open bodies overlap
+
+
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
     """Decide which triangles bound something and which way they face, or take them as oriented."""
     given = as_given(chain, chain.reversed)
@@ -83,69 +145,29 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     decided = _decided(chain, given, held, nested, as_oriented)
     if as_oriented or whole.all():
         return decided
-    # pieces as given, and the parts that they are in; loose triangles tell little one by one: they are read together
-    pieces = np.full(len(whole), -1)
-    names, pieces[~whole] = np.unique(given.pieces[~whole], return_inverse=True)
-    loose = np.bincount(chain.complexes)[chain.complexes] == 1
-    parts = np.where(loose, -1, chain.complexes)[first_members(given.pieces, len(given.orientable))[names]]
-    parts = np.unique(parts, return_inverse=True)[1]
-    part_of = np.where(whole, -1, parts[pieces])
-    areas = np.bincount(pieces[~whole], chain.areas[~whole]).astype(np.float64)
-    part_areas = np.bincount(parts, areas).astype(np.float64)
-
-    def missing_of(decided: Bounding) -> Floats:
-        """Share of the area of each part that is unexplained."""
-        return means(unexplained(chain, decided.counts, pieces), parts, areas, len(part_areas))
-
-    def changed(decided: Bounding, other: Bounding) -> Floats:
-        """Share of the area of each part that counts in another way."""
-        rows = np.flatnonzero(~whole & (decided.counts != other.counts))
-        return np.bincount(part_of[rows], chain.areas[rows], len(part_areas)) / np.maximum(part_areas, 1e-300)
-
-    def differs(one: Reading, other: Reading) -> Bools:
-        """(p,) whether two readings count, or connect, triangles of each part in different ways."""
-        firsts = [first_members(reading.pieces, len(reading.orientable))[reading.pieces] for reading in (one, other)]
-        rows = np.flatnonzero(~whole & ((one.counts != other.counts) | (firsts[0] != firsts[1])))
-        return mask_of(len(part_areas), part_of[rows])
-
-    missing = missing_of(decided)
-    readings, chosen = [given], np.zeros(len(whole), dtype=np.int64)
-    if cone_volumes(chain.triangles, given.counts, part_of + 1, len(part_areas) + 1).sum() < 0:
+    parts = _Parts.of(chain, given)
+    missing = parts.missing(decided)
+    readings, chosen, overlapping = [given], np.zeros(len(whole), dtype=np.int64), False
+    if cone_volumes(chain.triangles, given.counts, parts.of_triangles + 1, len(parts.areas) + 1).sum() < 0:
         inside_out = _reversed(given)
         other = _decided(chain, inside_out, held, nested)
-        left = missing_of(other)
-        if part_areas @ left < part_areas @ missing - LEAST_GAIN * part_areas.sum():
+        left = parts.missing(other)
+        if parts.areas @ left < parts.areas @ missing - LEAST_GAIN * parts.areas.sum():
             readings, decided, missing = [inside_out], other, left
-    agreed = chain.agreeing_as_indexed()
-    agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
-    agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
-    outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
     by_once = once(chain)
-    # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
-    doubtful = (np.bincount(parts) > 1) | (missing > MOSTLY_WRONG) | _entangled(chain, part_of)
-    as_cavities = "cavities" if nested == "given" else nested
-    trials: tuple[tuple[Reading, Bools, float, bool, Nesting], ...] = (
-        (agreeing, differs(agreeing, given), WELL_EXPLAINED, True, nested),
-        (by_once, doubtful, WELL_EXPLAINED, True, nested),
-        (outwards, differs(outwards, agreeing), WELL_EXPLAINED, True, nested),
-        (by_once, doubtful, WELL_EXPLAINED, False, nested),  # what overlaps is one body's outside and inside
-        (by_once, doubtful, MOSTLY_WRONG, True, as_cavities),
-    )
-    overlapping = False
-    for reading, told, least, united, nesting in trials:
-        todo = told & (missing >= least)
-        again = any(reading is each for each in readings)  # in another way, which matters where bodies overlap
-        if not todo.any() or (again and not overlapping):
+    for trial in _trials(chain, parts, given, by_once, missing, nested):
+        todo = trial.parts & (missing >= trial.least)
+        if not todo.any() or (trial.overlaps and not overlapping):
             continue
-        readings.append(reading)
-        best = float(part_areas @ missing), decided, chosen, missing
+        readings.append(trial.reading)
+        best = float(parts.areas @ missing), decided, chosen, missing
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
-            tried = np.where(~whole & todo[part_of], len(readings) - 1, chosen)
-            fixed = held & (tried == 0)
-            other = _decided(chain, mixed(chain, readings, tried), fixed, nesting, united=united)
+            tried = np.where(~whole & todo[parts.of_triangles], len(readings) - 1, chosen)
+            reading, fixed = mixed(chain, readings, tried), held & (tried == 0)
+            other = _decided(chain, reading, fixed, trial.nested or nested, united=trial.united)
             overlapping |= other.overlapping
-            left, price = missing_of(other), LEAST_GAIN * changed(decided, other)
-            cost = float(part_areas @ (left + price))
+            left, price = parts.missing(other), LEAST_GAIN * parts.changed(decided, other)
+            cost = float(parts.areas @ (left + price))
             if cost < best[0]:
                 best = cost, other, tried, left
             better = todo & (left < missing - price)
@@ -153,10 +175,30 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
                 break
             todo = better
         _, decided, chosen, missing = best
-    inside = unexplained(chain, decided.counts, pieces) < MOSTLY_WRONG
-    inner = decided.inner | (~whole & ~decided.as_given & (decided.counts == 0) & inside[pieces])
+    inside = unexplained(chain, decided.counts, parts.pieces) < MOSTLY_WRONG
+    inner = decided.inner | (~whole & ~decided.as_given & (decided.counts == 0) & inside[parts.pieces])
     decided = replace(decided, inner=inner, turned=decided.turned & ~inner)
     return _with_sheets_agreeing(chain, decided, by_once, whole)
+
+
+def _trials(
+    chain: Chain, parts: _Parts, given: Reading, by_once: Reading, missing: Floats, nested: Nesting
+) -> list[_Trial]:
+    """List the readings to try after that as given, which leaves the (p,) shares `missing` of the parts."""
+    agreed = chain.agreeing_as_indexed()
+    agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
+    agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
+    outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
+    # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
+    doubtful = (np.bincount(parts.of_pieces) > 1) | (missing > MOSTLY_WRONG) | parts.entangled()
+    as_cavities: Nesting = "cavities" if nested == "given" else nested
+    return [
+        _Trial(agreeing, parts.differ(agreeing, given)),
+        _Trial(by_once, doubtful),
+        _Trial(outwards, parts.differ(outwards, agreeing)),
+        _Trial(by_once, doubtful, united=False, overlaps=True),
+        _Trial(by_once, doubtful, least=MOSTLY_WRONG, nested=as_cavities, overlaps=True),
+    ]
 
 
 def _with_sheets_agreeing(chain: Chain, decided: Bounding, agreeing: Reading, whole: Bools) -> Bounding:
@@ -173,16 +215,6 @@ def _with_sheets_agreeing(chain: Chain, decided: Bounding, agreeing: Reading, wh
         orientable=np.concatenate([decided.orientable, agreeing.orientable]),
         disagreeing=agreeing.disagreeing,
     )
-
-
-def _entangled(chain: Chain, parts: Ints) -> Bools:
-    """(p,) whether the box around each part meets that of another part; the last one has −1, or none."""
-    low, high = (np.full((int(parts.max(initial=-1)) + 2, 3), end) for end in (np.inf, -np.inf))
-    np.minimum.at(low, parts, chain.triangles.min(axis=1))
-    np.maximum.at(high, parts, chain.triangles.max(axis=1))
-    low, high = low[:-1], high[:-1]
-    starts, _ = BoxTree.of(low, high).meeting(np.stack([low, high, high], axis=1))
-    return np.asarray(np.diff(starts) > 1)
 
 
 def _with_ways(chain: Chain, reading: Reading, reversed: Bools) -> Reading:
