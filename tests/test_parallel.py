@@ -11,7 +11,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import box, sphere
-from signedheat import parallel
+from signedheat import parallel, samples
 from signedheat.jobs import run_cancellable
 
 
@@ -42,7 +42,7 @@ def test_completion_is_reported_on_and_not_waited_for(monkeypatch):
             raise Stop
 
     with pytest.raises(Stop):
-        sh.complete(sphere(400), progress=progress)
+        sh.complete(samples.without_faces(sphere(400), 0.1), progress=progress)
     assert not ended.is_set()
     ended.set()
 

@@ -28,6 +28,8 @@ APEX_IN_PLANE = 1e-9
 plane."""
 MOMENT_RADII = 1.25
 """Distance, relative to a node's radius, above which its moments replace its faces."""
+SUMMED_TRIANGLES = 64
+"""Of this many triangles or fewer all are summed for each point, which takes less time than their moments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +168,8 @@ CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1
 def _moments(triangles: Floats, tree: BoxTree) -> Floats:
     """Return (2 · leaves, 23) area vector, centre, (`MOMENT_RADII` · radius)², and coefficients of M and S."""
     leaves = len(tree.bounds) // 2
+    if len(triangles) <= SUMMED_TRIANGLES:
+        return np.full((2 * leaves, 7 + len(SQUARES) + len(CUBES)), np.inf)  # none is as far away as that
     grouped = tree.items.reshape(leaves, BOXES_PER_LEAF)
     blocks = [
         _of_leaves(triangles, grouped[start : start + ROWS_PER_TASK]) for start in range(0, leaves, ROWS_PER_TASK)
