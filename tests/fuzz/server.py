@@ -1,4 +1,4 @@
-"""A server's loop: ``python -m fuzz.server SECONDS``, in the folder tests, reads mixed uploads for so long.
+"""A server's loop: ``python -m fuzz.server SECONDS [SEED]``, in the folder tests, reads mixed uploads for so long.
 
 Seconds are those of a processor. Each upload is a right file, one that is damaged, or one that expands. It is read
 within a budget and, where it is small, completed and asked for distances. Told are the outcomes, the longest time of an
@@ -85,5 +85,5 @@ def main(seconds: float, seed: int = 0) -> int:
 
 if __name__ == "__main__":
     with forked():
-        status = main(*map(float, sys.argv[1:2]))
+        status = main(float(sys.argv[1]), *map(int, sys.argv[2:3]))
     sys.exit(status)

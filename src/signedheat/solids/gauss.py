@@ -138,9 +138,11 @@ class Matrix:
 
     def chosen(self, kept: Bools) -> Matrix:
         """Restrict the system to some of the pieces, which are renumbered."""
+        if kept.all():
+            return self
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
-        matrix = self.matrix[rows][:, kept]
+        matrix = self.matrix[np.ix_(rows, kept)]
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
@@ -165,7 +167,7 @@ class Matrix:
         result = np.empty(len(self.owners))
         for group in np.unique(groups):
             members, rows = groups == group, groups[self.owners] == group
-            result[rows] = self.matrix[rows][:, members] @ signs[members]
+            result[rows] = self.matrix[np.ix_(rows, members)] @ signs[members]
         return result
 
 
