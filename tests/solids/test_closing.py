@@ -10,7 +10,7 @@ import signedheat as sh
 from shapes.bodies import finer
 from signedheat import samples
 from signedheat.mesh.edges import edge_table
-from signedheat.solids import closing, lids
+from signedheat.solids import closing, lids, walls
 from signedheat.solids.closing import closed_by
 from signedheat.solids.rims import boundary, loops
 
@@ -214,3 +214,17 @@ def test_a_slit_that_is_left_between_two_corners_is_closed(monkeypatch, height):
     assert sorted(np.unique(added).tolist()) == [4, 5, 8, 9]
     assert len(points) == 10
     assert not edge_table(np.concatenate([faces, added])).balance.any()
+
+
+@pytest.mark.parametrize(
+    ("sides", "following", "run"),
+    [
+        ([0, 1, 2], [1, 2, 0], [0, 1, 2]),
+        ([1, 2, 3], [1, 2, 3, 4, 0], [1, 2, 3]),
+        ([0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], []),
+        ([0, 1, 3, 4, 5], [1, 2, 6, 4, 5, 3, 0], []),
+    ],
+    ids=["a loop", "a part of a loop", "two loops", "a part of a loop, and a loop"],
+)
+def test_sides_that_follow_each_other_are_a_run(sides, following, run):
+    np.testing.assert_array_equal(walls._run(np.array(sides), np.array(following)), run)

@@ -285,8 +285,8 @@ def deviation(
     vertices of the scan are used, so the orientation of its faces does not matter.
 
     Open parts, such as panels, facades and terrains, are measured without completion: deviations are positive on the
-    side to which most of the area of each component faces. A component is open if it bounds nothing, and all of them
-    are if a quarter of the surface would have to be completed.
+    side to which most of the area of each component faces. A component is open if it encloses nothing. If completion
+    would add more than a quarter of the area, all of them count as open. Scan and part have the same units.
 
     Parameters
     ----------

@@ -79,13 +79,13 @@ class Solid(Displayed, Represented, Frozen):
     origins : (m,) int
         Face of the shape that each triangle is part of; −1 in the completion.
     confidence : (m,) float
-        Confidence in each triangle.
+        Confidence in each triangle: 1 where it was given, less for patches, the farther they are from given faces.
     bounding : (m,) bool
         Whether a triangle has the inside behind it and the outside in front.
     windings : Windings
         Winding numbers of the triangles that bound the inside.
     source : TriangleMesh, optional
-        Triangles of the input, which barycentric coordinates refer to.
+        Triangles of the input, to whose faces `origins` and barycentric coordinates refer; None if it was not a mesh.
     diagnostics : Diagnostics
         Notes on faces that were flipped, left out and added.
     uncrossed : bool
@@ -126,7 +126,7 @@ class Solid(Displayed, Represented, Frozen):
 
     @cached_property
     def features(self) -> FaceFeatures:
-        """The triangles with their neighbourhoods; those that bound nothing are not regular."""
+        """The triangles with their neighbours across edges and at corners, as the search for nearest points needs."""
         faces = np.arange(3 * len(self.triangles)).reshape(-1, 3)
         return FaceFeatures.of(self.triangles.reshape(-1, 3), faces, self.confidence, self.bounding)
 
@@ -173,7 +173,7 @@ class Solid(Displayed, Represented, Frozen):
 
     @property
     def faces(self) -> TriangleMesh:
-        """The faces of the input, cut where bodies overlap."""
+        """The faces of the input as a mesh, flipped where needed and cut where bodies overlap, with all sheets."""
         return _mesh(self.triangles[self.origins >= 0])
 
     @property

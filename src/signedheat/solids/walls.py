@@ -132,8 +132,12 @@ def _run(sides: Ints, following: Ints) -> Ints:
     if len(begins) > 1 or not len(sides):
         return sides[:0]
     run = [int(begins[0]) if len(begins) else int(sides[0])]
+    chosen = set(sides.tolist())
     while len(run) < len(sides):
-        run.append(int(following[run[-1]]))
+        chosen.discard(run[-1])
+        if (onward := int(following[run[-1]])) not in chosen:  # a loop, with more sides elsewhere
+            return sides[:0]
+        run.append(onward)
     return np.array(run)
 
 
