@@ -8,7 +8,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints, read_only
+from ..arrays import Bools, Floats, Ints, mask_of, read_only
 from ..compiled import compiled
 from .components import connected_components
 from .edges import find_edges, pair_halfedges
@@ -93,18 +93,49 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     lengths, shortest = np.abs(points[heads] - points[tails]).max(axis=1), np.full(len(points), np.inf)
     for ends in (tails, heads):
         np.minimum.at(shortest, places[ends], np.where(lengths > 0, lengths, np.inf))
-    digits = 24 if _is_single(points[tails]) else 53
     while True:  # what is joined is a larger part
         parts = connected_components(len(points), places[tails], places[heads])[places]
-        sizes = part_sizes(points, parts, tails, heads)
-        last_places = _rounding(points[tails], parts[tails], len(sizes), digits)
-        reaches = np.maximum(units * 2.0**-24 * sizes[:, None], ONE_PLACE * last_places)[parts[rims]]
+        reaches = _reaches(points, parts, tails, heads, units)[parts[rims]]
         near = first[np.searchsorted(rims, rims[welded_within(points[rims], reaches)])]
         apart = np.abs(points[first] - points[near]).max(axis=1)
         joined = np.where(apart <= SEAM_WIDTH * np.minimum(shortest[first], shortest[near]), near, first)
         if len(np.unique(joined)) >= len(np.unique(places[rims])):
             return places
         places[rims] = joined
+
+
+def joined_copies(points: Floats, faces: Ints) -> Ints:
+    """Return (n,) the vertex that each is joined to, so that (m, 3) faces that only rounding separates are one.
+
+    Copies are faces of different connected parts, each corner of which is at one place with one of the other's. Parts
+    stay apart of which other points lie within `SEAM_UNITS`: some of their vertices would be joined, and some not.
+    """
+    places, tails, heads = np.arange(len(points)), faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    parts = connected_components(len(points), tails, heads)
+    owners = parts[faces[:, 0]]
+    if not len(faces) or (owners == owners[0]).all():
+        return places
+    reaches = _reaches(points, parts, tails, heads, ONE_PLACE)[parts]
+    near = welded_within(points, reaches)
+    first, _ = coincident_faces(near[faces].ravel(), np.arange(0, 3 * len(faces) + 1, 3))
+    copies = (first >= 0) & (owners[first] != owners)
+    if not copies.any():
+        return places
+    used = np.unique(faces)
+    wide, labels = welded_within(points, SEAM_UNITS / ONE_PLACE * reaches)[used], parts[used]
+    firsts = distinct_rows(np.stack([wide, near[used]], axis=1))[1]
+    several = np.bincount(wide[firsts], minlength=len(points))[wide] > 1  # at places farther apart than rounding
+    rows = distinct_rows(np.stack([wide, labels], axis=1))[0]
+    vague = mask_of(int(parts.max()) + 1, labels[several | (np.bincount(rows) > 1)[rows]])
+    copies &= ~(vague[owners] | vague[owners[first]])
+    return np.where(np.isin(near, near[faces[copies]]), near, places)
+
+
+def _reaches(points: Floats, parts: Ints, tails: Ints, heads: Ints, units: float) -> Floats:
+    """Return (p, 3) the distance along each axis within which points of a part, (n,), are at one place."""
+    sizes, digits = part_sizes(points, parts, tails, heads), 24 if _is_single(points[tails]) else 53
+    last_places = _rounding(points[tails], parts[tails], len(sizes), digits)
+    return np.maximum(units * 2.0**-24 * sizes[:, None], ONE_PLACE * last_places)
 
 
 def _is_single(points: Floats) -> bool:
