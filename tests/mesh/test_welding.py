@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
-from signedheat.mesh.welding import ONE_PLACE, joined_rims, same_positions, welded, welded_within
+from signedheat.mesh.welding import ONE_PLACE, joined_copies, joined_rims, same_positions, welded, welded_within
 
 PLACES = ((0, 0, 0), (1e3, -1e3, 10), (431250, 5412300, 100), (1e6, 1e6, 1e6), (1e7, 0, 0), (1e7, 1e7, 1e7))
 SIDES = np.array([[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]])
@@ -102,3 +102,33 @@ def test_two_corners_far_away_take_no_other_face_with_them(far, other):
     kept = ball.faces[~np.isin(ball.faces, [3, 7]).any(axis=1)]
     middles = vertices[kept].mean(axis=1)
     assert np.abs(solid.distance(middles)).max() < 1e-9 + 4 * np.spacing(other)
+
+
+def two(first, second, move):
+    """Bodies side by side in one mesh, the second one moved."""
+    vertices = np.concatenate([first[0], second[0] + move])
+    return vertices, np.concatenate([first[1], second[1] + len(first[0])])
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("sides", [range(6), [0, 2, 4]])
+def test_faces_that_only_rounding_separates_are_copies(place, sides):
+    unit = 30 * np.spacing(np.float32(np.abs(place).max()))
+    body, last_place = house(unit, sides), np.spacing(np.abs(place).max() + 20 * unit)
+    vertices, faces = two(body, body, last_place)
+    ids = joined_copies(vertices + place, faces)[faces]
+    np.testing.assert_array_equal(ids[: len(ids) // 2], ids[len(ids) // 2 :])
+    assert len(np.unique(ids)) == len(np.unique(body[1]))
+
+
+@pytest.mark.parametrize("move", [1e-4, 1e-2, 1.0])
+def test_faces_farther_apart_than_rounding_are_no_copies(move):
+    vertices, faces = two(house(1.0), house(1.0), move)
+    np.testing.assert_array_equal(joined_copies(vertices, faces), np.arange(len(vertices)))
+
+
+def test_a_body_keeps_its_own_places_where_a_copy_of_it_has_moved():
+    """A wall as thin as rounding is there twice: which of its sides would be the other's copy is not known."""
+    wall = box((0, 0, 0), (1, 1, 3e-16))
+    vertices, faces = two(wall, wall, 0.0)
+    np.testing.assert_array_equal(joined_copies(vertices, faces), np.arange(len(vertices)))

@@ -85,6 +85,18 @@ def test_an_open_body_given_twice_is_one_body(name, noise):
     assert twice.inside([[0.5, 0.3, 0.0 if name == "half a ball" else 0.3]]).all()
 
 
+@pytest.mark.parametrize("noise", [1e-12, 1e-9])
+@pytest.mark.parametrize("lost", [(), (5, 40)])
+def test_an_open_ring_given_twice_a_rounding_apart_is_one_ring(noise, lost):
+    ring = sh.samples.torus(2, 1, 24, 12)
+    vertices, faces = below((ring.vertices, ring.faces), 0.0)
+    moved = vertices + noise * np.random.default_rng(0).normal(size=vertices.shape)
+    copies = [np.delete(faces, lost[k : k + 1], axis=0) for k in (0, 1)]
+    assert volume(joined((vertices, copies[0]), (moved, copies[1]))) == pytest.approx(
+        volume((vertices, faces)), rel=0.01
+    )
+
+
 @pytest.mark.parametrize("move", [1e-9, 1e-7, 1e-5])
 def test_a_closed_body_given_twice_is_one_body(move):
     vertices, faces = box((0, 0, 0), (2, 1, 0.7))

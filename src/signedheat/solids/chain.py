@@ -14,9 +14,9 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..mesh.components import connected_components, element_components, next_in_groups
-from ..mesh.edges import EdgeTable, FaceOrientation, edge_keys, edge_table, orient_faces, pair_halfedges
+from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
 from ..mesh.triangles import area_vectors, face_areas, part_volumes
-from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
+from ..mesh.unit_vectors import ANGLE_ROUNDING, angles_around, unit
 from ..mesh.welding import ONE_PLACE, coincident_faces, joined_copies, joined_rims, same_positions
 from ..surfaces.triangle_mesh import TriangleMesh
 
@@ -43,7 +43,7 @@ class Chain(Frozen):
         faces = same_positions(mesh.vertices)[mesh.faces]
         faces = joined_copies(mesh.vertices, faces)[faces]
         joined = joined_rims(mesh.vertices, faces.ravel(), np.roll(faces, -1, axis=1).ravel(), ONE_PLACE)
-        ids = _without_folds(mesh.vertices, faces, joined)[faces]
+        ids = joined[faces]
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))
         distinct = np.flatnonzero(first == np.arange(len(ids)))
         numbers = np.full(len(ids) + 1, -1)
@@ -159,40 +159,6 @@ class Chain(Frozen):
     def agreeing(self, used: Bools) -> FaceOrientation:
         """Turn triangles so that those agree that share an edge with no third one."""
         return orient_faces(self.faces, self.areas * np.sign(self.multiplicities), len(self.positions), used)
-
-
-def _without_folds(points: Floats, faces: Ints, joined: Ints) -> Ints:
-    """(n,) the vertex that each is joined to, or itself where this would fold a face back onto another one.
-
-    Rims of copies of a surface, moved by rounding, stay apart: a surface goes on beyond a seam.
-    """
-    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    places = np.arange(len(points))
-    moved = joined != places
-    moved[joined[moved]] = True
-    near = np.flatnonzero(moved[tails] & moved[heads])
-    if not len(near):
-        return joined
-    tails, heads, beyond = tails[near], heads[near], np.roll(faces, -2, axis=1).ravel()[near]
-    edges = edge_keys(joined[tails], joined[heads])
-    order = np.argsort(edges, kind="stable")
-    along = unit(points[heads] - points[tails])
-    into = points[beyond] - points[tails]
-    into = unit(into - (into * along).sum(axis=1)[:, None] * along)
-    folded = np.zeros(len(near), dtype=bool)
-    for step in range(1, len(order)):
-        first, second = order[:-step], order[step:]
-        pairs = edges[first] == edges[second]
-        if not pairs.any():
-            break
-        first, second = first[pairs], second[pairs]
-        apart = edge_keys(tails[first], heads[first]) != edge_keys(tails[second], heads[second])
-        fold = apart & ((into[first] * into[second]).sum(axis=1) > SAME_WAY)
-        folded[first[fold]] = folded[second[fold]] = True
-    ends = np.concatenate([tails[folded], heads[folded]])
-    result = joined.copy()
-    result[ends] = ends
-    return result
 
 
 def _levels(gaps: Floats, onward: Ints, edges: Ints) -> Ints:
