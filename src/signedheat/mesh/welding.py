@@ -117,6 +117,8 @@ def joined_copies(points: Floats, faces: Ints) -> Ints:
         return places
     reaches = _reaches(points, parts, tails, heads, ONE_PLACE)[parts]
     near = welded_within(points, reaches)
+    if (near == places).all():
+        return places
     first, _ = coincident_faces(near[faces].ravel(), np.arange(0, 3 * len(faces) + 1, 3))
     copies = (first >= 0) & (owners[first] != owners)
     if not copies.any():
@@ -133,8 +135,9 @@ def joined_copies(points: Floats, faces: Ints) -> Ints:
 
 def _reaches(points: Floats, parts: Ints, tails: Ints, heads: Ints, units: float) -> Floats:
     """Return (p, 3) the distance along each axis within which points of a part, (n,), are at one place."""
-    sizes, digits = part_sizes(points, parts, tails, heads), 24 if _is_single(points[tails]) else 53
-    last_places = _rounding(points[tails], parts[tails], len(sizes), digits)
+    used = np.flatnonzero(mask_of(len(points), tails))
+    sizes, digits = part_sizes(points, parts, tails, heads), 24 if _is_single(points[used]) else 53
+    last_places = _rounding(points[used], parts[used], len(sizes), digits)
     return np.maximum(units * 2.0**-24 * sizes[:, None], ONE_PLACE * last_places)
 
 
