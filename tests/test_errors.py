@@ -113,3 +113,12 @@ def test_what_is_quoted_keeps_errors_to_one_line():
         str(sh.errors.SignedHeatError(f"no {np.zeros((2, 2))!r}", remedy="none"))
         == "no array([[0., 0.], [0., 0.]]): none"
     )
+
+
+@pytest.mark.parametrize("call", [sh.complete, lambda mesh: sh.signed_distance(mesh, resolution=16)])
+def test_warnings_name_the_line_of_the_caller(call):
+    ball = sh.samples.sphere(2)
+    upper = ball.faces[ball.vertices[ball.faces].mean(axis=1)[:, 2] > 0]
+    with pytest.warns(sh.errors.InexactWarning) as caught:
+        call((ball.vertices, upper))
+    assert {Path(warning.filename).name for warning in caught} == {Path(__file__).name}

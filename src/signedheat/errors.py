@@ -275,7 +275,7 @@ class InexactWarning(UserWarning):
 
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning attributed to the line of user code that called this package."""
-    within = {__name__.partition(".")[0], "functools"}  # whose singledispatch calls functions of this package
+    within = {__name__.partition(".")[0], "functools", "contextlib"}  # the last two call functions that they decorate
     depth, frame = 1, inspect.currentframe()
     while frame and frame.f_back and frame.f_globals.get("__name__", "").partition(".")[0] in within:
         frame, depth = frame.f_back, depth + 1
