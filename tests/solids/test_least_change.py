@@ -297,3 +297,17 @@ def test_a_frame_with_flipped_triangles_given_twice_a_rounding_apart_is_one_fram
     vertices, faces = turned(mesh, rng.random(12 * len(BARS)) < 0.2)
     shaken = vertices + 1e-8 * rng.normal(size=vertices.shape)
     assert volume(joined((vertices, faces), (shaken, faces))) == pytest.approx(102, rel=1e-6)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.3])
+def test_hidden_bodies_stay_bodies_though_some_of_their_faces_are_flipped(share):
+    """What most of their area says decides: a cavity stays one, too."""
+    rng = np.random.default_rng(4)
+    around, parts = box((0, 0, 0), (4, 1, 1)), [ball(3), ball(3)]
+    hidden = [(0.3 * part[0] + [x, 0.5, 0.5], part[1]) for part, x in zip(parts, (1, 3), strict=True)]
+    mesh = joined(around, hidden[0], turned(hidden[1], np.ones(len(hidden[1][1]), dtype=bool)))
+    flipped = rng.random(len(mesh[1])) < share
+    flipped[: len(around[1])] = False
+    found = sh.complete(turned(mesh, flipped))
+    assert found.volume == pytest.approx(4.0 - volume(hidden[1]))
+    assert found.inside([[1, 0.5, 0.5], [3, 0.5, 0.5]]).tolist() == [True, False]

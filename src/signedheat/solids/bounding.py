@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of
-from ..mesh.box_tree import BoxTree
 from ..mesh.components import connected_components, first_members, sums_of
 from ..mesh.triangles import area_vectors, cone_volumes
 from ..mesh.unit_vectors import unit
@@ -115,15 +114,6 @@ class _Parts:
         rows = np.flatnonzero(~self.whole & ((one.counts != other.counts) | (firsts[0] != firsts[1])))
         return mask_of(len(self.areas), self.of_triangles[rows])
 
-    def entangled(self) -> Bools:
-        """(p,) whether the box around each part meets that of another part."""
-        low, high = (np.full((len(self.areas) + 1, 3), end) for end in (np.inf, -np.inf))
-        np.minimum.at(low, self.of_triangles, self.chain.triangles.min(axis=1))
-        np.maximum.at(high, self.of_triangles, self.chain.triangles.max(axis=1))
-        low, high = low[:-1], high[:-1]  # the last one has the whole triangles
-        starts, _ = BoxTree.of(low, high).meeting(np.stack([low, high, high], axis=1))
-        return np.asarray(np.diff(starts) > 1)
-
 
 @dataclass(frozen=True, eq=False)
 class _Trial:
@@ -189,8 +179,8 @@ def _trials(
     agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
     agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
     outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
-    # a single piece that agrees, with nothing near it, can only be turned: wrong where it is more right than wrong
-    doubtful = (np.bincount(parts.of_pieces) > 1) | (missing > MOSTLY_WRONG) | parts.entangled()
+    # a single piece that agrees can only be turned, which costs `LEAST_GAIN`
+    doubtful = (np.bincount(parts.of_pieces) > 1) | (missing > LEAST_GAIN)
     as_cavities: Nesting = "cavities" if nested == "given" else nested
     return [
         _Trial(agreeing, parts.differ(agreeing, given)),

@@ -29,7 +29,7 @@ from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
 from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
-from ..mesh.components import numbered, sums_of
+from ..mesh.components import first_members, numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas, halved, side_lengths
 from ..mesh.unit_vectors import unit
 from ..parallel import PointTree, in_chunks
@@ -96,6 +96,20 @@ def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
     return np.bincount(groups, weights * values, n) / np.maximum(total, np.finfo(float).tiny)
 
 
+def together(fixed: Bools) -> Ints:
+    """(k,) number of the weight of each piece: pieces that are fixed share the first one, so that they keep their ways.
+
+    What is left of a broken body has less than its level; with a weight of 1 others would have to make up for that.
+    """
+    return np.where(fixed, 0, np.cumsum(~fixed) - (0 if fixed.any() else 1))
+
+
+def as_fixed(weights: Floats, names: Ints, fixed: Bools) -> Floats:
+    """(k,) weights of pieces by their numbers, all turned if those of `fixed` ones would be negative."""
+    turned = fixed.any() and weights[0] < 0
+    return np.asarray(-weights if turned else weights)[names]
+
+
 @dataclass(frozen=True, eq=False)
 class Matrix:
     """Matrix W of few pieces, by exact solid angles, at sampled places."""
@@ -146,17 +160,18 @@ class Matrix:
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
-        """(k,) least-squares weights, 1 if `fixed`, whose signs orient the pieces; the solution needs no start."""
+        """(k,) least-squares weights, whose signs orient the pieces; `fixed` ones share one. It needs no start."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
+        names, k = together(fixed), self.matrix.shape[1]
+        sums = sparse.csr_array((np.ones(k), (np.arange(k), names)))
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
         normal += agreement(self.places, self.normals, shares, self.owners).toarray()
-        held = np.bincount(self.owners, shares, self.matrix.shape[1])
+        held = np.bincount(self.owners, shares, k)
         normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(held, LEAST_AREA_SHARE)
-        weights, free = np.ones(len(fixed)), ~fixed
-        wanted = (weighted.T @ (0.5 + self.within))[free] - normal[free][:, fixed].sum(axis=1)
-        weights[free] = scipy.linalg.solve(normal[free][:, free], wanted, assume_a="pos")
-        return weights
+        wanted = weighted.T @ (0.5 + self.within)
+        weights = scipy.linalg.solve(sums.T @ (sums.T @ normal).T, sums.T @ wanted, assume_a="pos")
+        return as_fixed(weights, names, fixed)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the samples, without the bodies ignored there."""
@@ -297,24 +312,22 @@ class Dipoles:
         return Dipoles(places, normals, areas, owners, softening, within)
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
-        """(k,) weights, 1 if `fixed`, by conjugate gradients from weights near them, or from zero."""
+        """(k,) weights, those `fixed` alike, by conjugate gradients from weights near them, or from zero."""
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
-        smooth = agreement(self.places, self.normals, shares, self.owners)
+        smooth, names = agreement(self.places, self.normals, shares, self.owners), together(fixed)
+        n = int(names.max()) + 1
         held = WEIGHT_DAMPING * np.bincount(self.owners, shares)
 
-        def every(weights: Floats) -> Floats:
-            return self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
+        def system(values: Floats) -> Floats:
+            weights = values[names]
+            of_each = self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
+            return sums_of(of_each, names, n)
 
-        def system(weights: Floats) -> Floats:
-            return np.where(fixed, 0.0, every(np.where(fixed, 0.0, weights)))
-
-        inverse = 1.0 / np.maximum(smooth.diagonal() + held, np.finfo(float).tiny)
-        wanted = self._adjoint((0.5 + self.within) * shares)
-        if fixed.any():
-            wanted = np.where(fixed, 0.0, wanted - every(fixed.astype(np.float64)))
-            start = None if start is None else np.where(fixed, 0.0, start)
-        weights = conjugate_gradients(system, wanted, lambda rest: inverse * rest, start, WEIGHT_TOLERANCE)
-        return np.where(fixed, 1.0, weights)
+        inverse = 1.0 / np.maximum(sums_of(smooth.diagonal() + held, names, n), np.finfo(float).tiny)
+        wanted = sums_of(self._adjoint((0.5 + self.within) * shares), names, n)
+        near = None if start is None else start[first_members(names, n)]
+        weights = conjugate_gradients(system, wanted, lambda rest: inverse * rest, near, WEIGHT_TOLERANCE)
+        return as_fixed(weights, names, fixed)
 
     def levels(self, signs: Floats) -> Floats:
         """(n,) levels at the places, without the bodies ignored there."""

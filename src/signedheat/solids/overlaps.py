@@ -83,7 +83,7 @@ Nesting = Literal["given", "cavities", "bodies"]
 SHEET = 0.146
 """Level below which a piece bounds nothing: its squared distance from ½ is more than half of that of a flat sheet,
 (½ − 0.146)² = ½ · ¼. Flat and wavy sheets have 0, a seventh of a ball 0.16, half of one 0.31, all of it ½."""
-HINT = 0.5
+HINT = 0.25
 """A piece was given as facing one way if the area that does so exceeds the rest by this share of the whole."""
 OUTSIDE = 0.05
 """Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within if at most this
