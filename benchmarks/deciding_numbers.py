@@ -6,9 +6,9 @@ A scene is made of parts of which it is known whether they bound a solid, and of
 if it is taken for a sheet though it bounds, the other way round, or if it faces inwards. Printed are the share of the
 area that is wrong in each scene, and, for each number, the scenes where that changes by more than a hundredth. Of
 shares above a half, twice is half of the way to one. The numbers that choose between readings are also swept over
-assemblies of boxes; those of what is proven equal to a solid over surfaces of assemblies; the one that decides between lids and heat over the volume that shapes enclose, that of seams of
-surfaces over seams that were rounded, and slits; those within which points are one over boxes that touch; those of
-seals over bodies with double skins, leaks and bodies within; the size of parts that `signedheat info` calls small over
+assemblies of boxes; those of what is proven equal to a solid over surfaces of assemblies; the one that decides
+between lids and heat over the volume that shapes enclose, that of seams of surfaces over seams that were rounded, and
+slits; those within which points are one over boxes that touch; those of seals over bodies with double skins, leaks and bodies within; the size of parts that `signedheat info` calls small over
 bodies with crumbs, and with screws, which are none.
 """
 
