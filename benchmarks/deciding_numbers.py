@@ -8,7 +8,8 @@ area that is wrong in each scene, and, for each number, the scenes where that ch
 shares above a half, twice is half of the way to one. The numbers that choose between readings are also swept over
 assemblies of boxes; those of what is proven equal to a solid over surfaces of assemblies; the one that decides
 between lids and heat over the volume that shapes enclose, that of seams of surfaces over seams that were rounded, and
-slits; those within which points are one over boxes that touch; those of seals over bodies with double skins, leaks and bodies within; the size of parts that `signedheat info` calls small over
+slits; those within which points are one over boxes that touch; those of seals over bodies with double skins, leaks
+and bodies within; the size of parts that `signedheat info` calls small over
 bodies with crumbs, and with screws, which are none.
 """
 
