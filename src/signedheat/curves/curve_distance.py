@@ -122,7 +122,6 @@ def distance_to_pieces(
     """
     listed = flattened(curves)
     numbers = np.arange(len(listed)) if numbers is None else numbers
-    surface_of(solver).segments(listed)  # refuses curves that do not fit
     once = triangulated_once(solver, listed)
     pieces = pieces or CurvePieces.of(surface_of(once), listed)
     if pieces is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -55,9 +56,14 @@ class ConformingRefinement(Frozen):
         corners = np.take_along_axis(np.broadcast_to(corners, (len(faces), 3, 3))[faces], turns[:, :, None], axis=1)
         return cls(finer, np.isin(edges, along), parents[faces], corners)
 
+    @cached_property
+    def children(self) -> tuple[Ints, Ints]:
+        """Starts (f + 1,) and members (m,): the faces after the cuts that each face before them became."""
+        return grouped(self.parents, int(self.parents.max()) + 1)
+
     def push_forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
         """Transfer points, and vectors (p, k, 3) at them, from the faces before the cuts to the faces after."""
-        segments, child = members_of(*grouped(self.parents, int(self.parents.max()) + 1), faces)
+        segments, child = members_of(*self.children, faces)
         corners = self.corners[child]
         is_flat = np.linalg.det(corners) == 0  # parts without area contain a point only if no other part does
         to_child = np.empty_like(corners)

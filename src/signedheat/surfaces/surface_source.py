@@ -111,12 +111,13 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
     ψ_e(m) is replaced by its mean, ⅓. (The published code adds the whole vector to each of the three edges.)
     """
-    sums = csr_array((1, triangles.n_edges), dtype=np.complex128)
-    for part in parts:
-        along, inside = part.edges >= 0, part.edges < 0
-        sums = sums + scatter(triangles.n_edges, part.edges[along], part.vectors[along])
-        sums = sums + from_faces(triangles, part.faces[inside], part.vectors[inside] / 3)
-    return sums
+    edges, faces, vectors = (
+        np.concatenate([np.empty(0, kind), *(getattr(part, name) for part in parts)])
+        for name, kind in (("edges", np.int64), ("faces", np.int64), ("vectors", np.complex128))
+    )
+    along, inside = edges >= 0, edges < 0
+    on_edges = scatter(triangles.n_edges, edges[along], vectors[along])
+    return on_edges + from_faces(triangles, faces[inside], vectors[inside] / 3)
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
