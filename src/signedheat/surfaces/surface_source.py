@@ -111,10 +111,11 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
     ψ_e(m) is replaced by its mean, ⅓. (The published code adds the whole vector to each of the three edges.)
     """
-    edges, faces, vectors = (
-        np.concatenate([np.empty(0, kind), *(getattr(part, name) for part in parts)])
-        for name, kind in (("edges", np.int64), ("faces", np.int64), ("vectors", np.complex128))
+    edges, faces = (
+        np.concatenate([np.empty(0, dtype=np.int64), *of_each])
+        for of_each in ([part.edges for part in parts], [part.faces for part in parts])
     )
+    vectors = np.concatenate([np.empty(0, dtype=np.complex128), *(part.vectors for part in parts)])
     along, inside = edges >= 0, edges < 0
     on_edges = scatter(triangles.n_edges, edges[along], vectors[along])
     return on_edges + from_faces(triangles, faces[inside], vectors[inside] / 3)
