@@ -115,7 +115,7 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
         np.concatenate([np.empty(0, dtype=np.int64), *of_each])
         for of_each in ([part.edges for part in parts], [part.faces for part in parts])
     )
-    vectors = np.concatenate([np.empty(0, dtype=np.complex128), *(part.vectors for part in parts)])
+    vectors: Complexes = np.concatenate([np.empty(0, dtype=np.complex128), *(part.vectors for part in parts)])
     along, inside = edges >= 0, edges < 0
     on_edges = scatter(triangles.n_edges, edges[along], vectors[along])
     return on_edges + from_faces(triangles, faces[inside], vectors[inside] / 3)
