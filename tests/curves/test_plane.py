@@ -1,6 +1,7 @@
 """Distance to drawings in the plane: exact to their lines, completed where lines are missing."""
 
 import warnings
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -79,6 +80,34 @@ def test_closed_outlines_are_filled(seed, fill):
     nearer = points + rng.uniform(0, 0.7, points.shape) * found.distances[:, None]
     np.testing.assert_array_equal(is_filled(nearer), is_filled(points))
     np.testing.assert_allclose(np.linalg.norm(points + place - found.points, axis=1), np.abs(found.distances))
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-5, 1e-6])
+def test_spikes_and_clefts_have_sides(width, seed):
+    rng = np.random.default_rng(seed)
+    spike = np.array([[0, 0], [1, -width], [1, -1], [2, -1], [2, 1], [1, 1], [1, width]])
+    cleft = np.array([[0, 0], [1.5, width], [1.5, 1], [-1, 1], [-1, -1], [1.5, -1], [1.5, -width]])
+    angle, place = rng.uniform(0, 2 * np.pi), rng.uniform(-5, 5, 2) * (seed > 3)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    outline = (cleft if seed % 2 else spike) @ turn + place
+    # points beside the tip, nearly at a right angle to it
+    angles = rng.choice([-1, 1], 200) * (np.pi / 2 + width * rng.normal(size=200))
+    away = np.stack([np.cos(angles), np.sin(angles)], axis=1) * 10 ** rng.uniform(-9, -1, (200, 1))
+    points = outline[0] + away @ turn
+    found = sh.signed_distance([sh.Polyline(outline, closed=True)], resolution=16).closest(points).distances
+    corners = [tuple(map(Fraction, corner)) for corner in outline.tolist()]
+    inside = [is_inside(corners, *map(Fraction, point)) for point in points.tolist()]
+    np.testing.assert_array_equal(found < 0, inside)
+
+
+def is_inside(corners, x, y):
+    """Whether a point is inside an outline, without rounding."""
+    meetings = 0
+    for (ax, ay), (bx, by) in zip(corners, corners[1:] + corners[:1], strict=True):
+        if (ay <= y) != (by <= y):
+            meetings += ((bx - ax) * (y - ay) > (by - ay) * (x - ax)) == (by > ay)
+    return meetings % 2 == 1
 
 
 def test_outlines_unite_whichever_way_they_run():

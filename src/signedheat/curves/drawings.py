@@ -44,7 +44,8 @@ STROKE_NODES = 96
 """Number of nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong
 in silence and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
 LEAST_SLOPE = 1e-6
-"""Sine of the angle between the tangent at a corner and the way to a point, from which on the normal decides."""
+"""Component, along the sum of the unit normals at a corner, of the direction to a point, from which on it decides the
+side. Of 13,440 points beside spikes 355 are wrong, from 1e-6 to 0.1, all at spikes of 1e-8 or less. At 0 1,744 are."""
 SIDE_CELLS = 1.5
 """Within this distance, in cells, a line decides the side itself: φ is smooth over about a cell."""
 
@@ -322,20 +323,18 @@ class Drawing(Frozen):
         ends = self.lines[nearest]
         along = ends[:, 1] - ends[:, 0]
         normals = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        crowded = np.zeros(len(points), dtype=bool)
+        at_corner, crowded = np.zeros((2, len(points)), dtype=bool)
         reach = 1e-9 * np.linalg.norm(along, axis=1)
         for end in range(2):
             is_end = np.linalg.norm(places - ends[:, end], axis=1) <= reach
             corner = corners[nearest, end]
             normals = np.where(is_end[:, None], sums[corner], normals)
+            at_corner |= is_end
             crowded |= is_end & (counts[corner] > 2)
         heights = ((points - places) * normals).sum(axis=1)
         sides = np.where(heights < 0, -1.0, 1.0)
-        slopes = np.abs(heights) / np.maximum(np.linalg.norm(normals, axis=1), SMALLEST_EXTENT)
-        crowded |= slopes <= LEAST_SLOPE * np.linalg.norm(points - places, axis=1)
-        if (
-            self.phi is None and crowded.any()
-        ):  # outlines touch there, and their normals may cancel, or corners are near
+        crowded |= at_corner & (np.abs(heights) <= LEAST_SLOPE * np.linalg.norm(points - places, axis=1))
+        if self.phi is None and crowded.any():  # outlines touch there, or their normals cancel, as at spikes
             sides[crowded] = np.where(_enclosed(self.lines, points[crowded]), -1.0, 1.0)
         return sides
 
