@@ -22,15 +22,15 @@ angle = np.linspace(0, 2 * np.pi, 181)
 reach = np.degrees(0.6) * (1 + 0.12 * np.cos(5 * angle))  # with bays
 coast = np.stack([-60 + reach * np.cos(angle) / np.cos(np.radians(15)), 15 + reach * np.sin(angle)], axis=1)
 points = np.array([direction(*place) for place in coast])
-pieces = [globe.polyline(points[a : a + 16]) for a in range(0, 170, 22)]  # six of 22 steps are missing
+lines = [globe.polyline(points[a : a + 16]) for a in range(0, 170, 22)]  # six of 22 steps are missing
 
-phi = sh.signed_distance(pieces, globe)
-whole = sh.close_curves(pieces, globe)
+phi = sh.signed_distance(lines, globe)
+whole = sh.close_curves(lines, globe)
 
 eye = direction(-50.0, 25.0)
 view.save_row(
     [
-        ("the lines, and distance from the coast", phi, {"sources": pieces, "view": eye}),
+        ("the lines, and distance from the coast", phi, {"sources": lines, "view": eye}),
         ("the coast, closed", phi, {"sources": whole, "view": eye}),
     ],
     "coastline.png",

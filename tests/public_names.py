@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 
 import signedheat as sh
@@ -36,3 +37,13 @@ def methods() -> list[tuple[str, object]]:
             if inspect.isroutine(function) and is_ours and not method.startswith("_"):
                 found.append((f"{name}.{method}", function))
     return found
+
+
+def properties() -> list[tuple[str, object]]:
+    """Every public property of the public classes, by its full name; those of base classes, too."""
+    return [
+        (f"{name}.{attribute}", value)
+        for name, thing in PUBLIC
+        for attribute, value in (inspect.getmembers(thing) if isinstance(thing, type) else ())
+        if isinstance(value, property | functools.cached_property) and not attribute.startswith("_")
+    ]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import signedheat
-from public_names import PUBLIC, methods
+from public_names import PUBLIC, methods, properties
 from signedheat.io import shape_files as shapes
 
 ROOT = Path(__file__).parents[1]
@@ -163,6 +163,22 @@ def test_docstrings_say_what_else_to_look_at(name, thing):
     assert found, f"{name} has no section See Also"
     targets = [line.partition(" : ")[0] for line in found[1].splitlines()]
     assert targets and set(targets) <= KNOWN - {name}
+
+
+QUANTITIES = re.compile(
+    r"(^|[._])(distance|length|area|volume|angle|spacing|thickness|offset|deviation)s?($|[._])", re.IGNORECASE
+)
+WITHOUT_UNITS = {"io.read_volume", "results.Deviation.worst"}  # an image, and ids of points
+MEASURED = [
+    (name, thing)
+    for name, thing in [*PUBLIC, *methods(), *properties()]
+    if QUANTITIES.search(name) and name not in WITHOUT_UNITS
+]
+
+
+@pytest.mark.parametrize(("name", "thing"), MEASURED, ids=[name for name, _ in MEASURED])
+def test_docstrings_of_quantities_state_their_units(name, thing):
+    assert re.search(r"\bunits?\b|degrees|radians", (inspect.getdoc(thing) or "").partition("\nExamples\n")[0]), name
 
 
 @pytest.mark.parametrize(("name", "function"), CALLABLE, ids=[name for name, _ in CALLABLE])

@@ -61,7 +61,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
         Where distance is measured. Boundary vertices of a mesh that coincide, as along seams, are treated as one.
     diffusion : float or Extrapolated, optional
-        τ in ``t = τ h²``, h the mean distance between unknowns; the paper's is 1. Larger values close gaps in broken
+        τ in ``t = τ h²``, the time for which normals of the source are diffused like heat, with h the mean distance
+        between unknowns; the paper's is 1. Larger values close gaps in broken
         sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
@@ -174,12 +175,13 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             On surfaces: `Curve`, `SurfacePoints`, or potpourri3d's lists of (element, coordinates). In space:
             `TriangleMesh`, `PolygonMesh`, `PointCloud`. In the plane: `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Constraint on φ at the sources; `ZeroSet` by default.
+            Constraint on φ at the sources; `ZeroSet` by default, which makes them its zero set.
 
         Returns
         -------
         Field
-            On the domain. φ > 0 on the side that the source normals point to, on a surface to the left of a curve.
+            φ on the domain, in its units: positive on the side that the source normals point to, so negative inside,
+            and on a surface positive to the left of a curve.
 
         Raises
         ------
@@ -273,7 +275,15 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Returns
         -------
         list of Field
-            The result of `distance` for each, up to rounding. Timings are divided equally among the sources.
+            The result of `distance` for each, up to rounding, in the units of the domain and with the same signs.
+            Timings are divided equally among the sources.
+
+        Raises
+        ------
+        SourceError
+            If an entry has no source, or one that does not fit the domain.
+        ConstraintError
+            If the constraint does not fit the sources.
 
         See Also
         --------

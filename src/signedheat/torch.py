@@ -34,15 +34,15 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     solid : Solid
         What `complete` has made of a mesh. Complete it again when an optimiser has moved the vertices.
     points : (..., 3) tensor
-        Where to measure, in batches of any shape, on any device.
+        Positions in the units of the solid, in batches of any shape, on any device.
     vertices : (k, 3) tensor, optional
         Vertices of the mesh that was completed, if derivatives with respect to them are wanted.
 
     Returns
     -------
     (...) tensor
-        Distances with the shape and device of the points, and their type if it is a floating-point type; computed on
-        the CPU in double precision.
+        Distances in the units of the solid, with the shape and device of the points, and their type if it is a
+        floating-point type; computed on the CPU in double precision.
 
     Raises
     ------

@@ -52,7 +52,7 @@ class Cut(Frozen):
 
     @property
     def length(self) -> float:
-        """Length of the cut."""
+        """Length of the cut, in the units of the surface."""
         return float(self.steps.sum())
 
     @property

@@ -172,22 +172,28 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.interpolate(points) if self.solid is None else self.solid.distance(cast("ArrayLike", points))
 
     def interpolate(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """φ at points, from the values around them.
+        """Interpolate the values of the field at points; call the field for exact distance where it holds a solid.
 
-        Interpolation is multilinear between the nodes of grids that have a value, and beyond a band between the coarse
-        nodes. It is of second order in tets, from values and gradients at the vertices, and linear in triangles.
-        Outside a grid or tets, φ continues linearly from the nearest point of the domain, along the gradient there:
-        this is continuous, and for a convex shape inside the box of a grid a lower bound of the distance.
+        Between the nodes of a grid, φ is linear along each axis. Beyond a band, which has fine nodes near the surface
+        only, the nodes of a coarse grid are used. In triangles φ is linear. In tets it is quadratic, from values and
+        gradients at the vertices. Outside a grid or tets, φ continues linearly from the nearest point of the domain,
+        along the gradient there. If the shape is convex and lies in the grid, that is never more than the distance.
 
         Parameters
         ----------
         points : (..., d) float, Curve or SurfacePoints
-            As for calling the field.
+            Positions with d coordinates, in the units of the domain. On surfaces, φ is taken at the nearest point of
+            the surface, or in the faces in which a `Curve` or `SurfacePoints` is given.
 
         Returns
         -------
         (...) float
-            Signed distances; NaN where no value is near.
+            Signed distances in the units of the domain, negative inside; NaN where no value is near.
+
+        Raises
+        ------
+        GeometryError
+            If points are not finite, or do not have d coordinates each.
 
         See Also
         --------
@@ -203,7 +209,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.finest._interpolant(points)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """∇φ in space at points: exact where the field has its solid, else that of the interpolant.
+        """Compute the direction in which φ grows: exactly where the field holds a solid, else from its values.
 
         On grids these are central differences, interpolated, on tets volume-weighted means at the vertices,
         interpolated, and on surfaces the gradient in the triangle. Outside a grid or tets, it is the gradient at the
@@ -212,12 +218,17 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Parameters
         ----------
         points : (..., d) float, Curve or SurfacePoints
-            As for calling the field.
+            Positions with d coordinates, in the units of the domain, or on a surface, as for `interpolate`.
 
         Returns
         -------
         (..., d) float
-            Gradients; of length about 1, since φ is a distance.
+            Gradients ∇φ in space, without units. They have length about 1, since φ is a distance.
+
+        Raises
+        ------
+        GeometryError
+            If points are not finite, or do not have d coordinates each.
 
         See Also
         --------

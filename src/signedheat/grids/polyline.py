@@ -136,17 +136,17 @@ class Polyline(Displayed, Frozen):
 
     @cached_property
     def segment_lengths(self) -> Floats:
-        """(m,) lengths."""
+        """(m,) lengths, in the units of the points."""
         return np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1)
 
     @property
     def length(self) -> float:
-        """Sum of the lengths of all segments."""
+        """Sum of the lengths of all segments, in the units of the points."""
         return float(self.segment_lengths.sum())
 
     @property
     def signed_area(self) -> float:
-        """Area that the polyline, closed, encloses; positive if it runs counter-clockwise."""
+        """Area in square units, positive if counter-clockwise; an open polyline is closed by a straight line."""
         x, y = np.moveaxis(self.segments - self.points[0], -1, 0)
         return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
 

@@ -119,7 +119,7 @@ class LabelImage(Represented, Frozen):
 
     @property
     def spacing(self) -> Floats:
-        """(3,) distance between the centres of neighbouring voxels."""
+        """(3,) distance between the centres of neighbouring voxels along x, y and z, in the units of the file."""
         return np.linalg.norm(self.axes, axis=0)
 
     @property

@@ -11,7 +11,7 @@ from ..compiled import compiled
 
 def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
     """Return (n,) the component of each node of a graph with edges tails to heads, numbered by first appearance."""
-    return _labels(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
+    return _component_numbers(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
 
 
 def element_components(elements: Ints) -> Ints:
@@ -32,8 +32,11 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 
 
 @compiled
-def _labels(n: int, tails: Ints, heads: Ints) -> Ints:
-    """Return (n,) components by union-find: the root of each tree is its least node, and paths to it are halved."""
+def _component_numbers(n: int, tails: Ints, heads: Ints) -> Ints:
+    """Return for each of n nodes the number of its connected component (n,), from 0 on, in order of its least node.
+
+    Edge k joins nodes `tails[k]` and `heads[k]`. This is union-find: trees have their least node as root.
+    """
     parents = np.arange(n)
     for k in range(len(tails)):
         a, b = tails[k], heads[k]

@@ -102,6 +102,7 @@ def _(shape: PolygonMesh) -> AreaElements:
 
 @area_elements.register
 def _(shape: PointCloud) -> AreaElements:
+    """Return one element for each point: its area times its normal."""
     if shape.normals is None:
         raise SourceError(
             "the point cloud has no normals, which are needed to tell inside from outside",

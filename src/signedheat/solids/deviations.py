@@ -82,12 +82,12 @@ class Deviation(Frozen):
 
     @property
     def points(self) -> Floats:
-        """(n, 3) positions of the scan's points or vertices."""
+        """(n, 3) positions of the scan's points or vertices, in its units."""
         return self.scan.points if isinstance(self.scan, PointCloud) else self.scan.vertices
 
     @cached_property
     def of_surface(self) -> Floats:
-        """(m,) distances of all points, or of the vertices that faces use."""
+        """(m,) distances of all points, or of vertices that faces use, in the units of the scan; positive outside."""
         return self.distances[self._ids]
 
     @cached_property
@@ -99,12 +99,12 @@ class Deviation(Frozen):
 
     @property
     def rms(self) -> float:
-        """Root mean square of the deviations."""
+        """Root mean square of the deviations, in the units of the scan."""
         return float(np.sqrt(np.mean(self.of_surface**2)))
 
     @property
     def extreme(self) -> float:
-        """The 99th percentile of the absolute deviations: colour scales end there, so that outliers do not dominate."""
+        """The 99th percentile of the absolute deviations, in the units of the scan: colour scales end there."""
         return float(np.percentile(np.abs(self.of_surface), 99.0))
 
     def within(self, tolerance: float) -> float:
@@ -113,7 +113,7 @@ class Deviation(Frozen):
         Parameters
         ----------
         tolerance : float
-            A length.
+            A length, in the units of the scan.
 
         Returns
         -------
@@ -145,7 +145,7 @@ class Deviation(Frozen):
         Returns
         -------
         (k,) float
-            Signed distances to the part, positive outside.
+            Signed distances to the part, in the units of the scan; positive outside.
 
         See Also
         --------
@@ -174,7 +174,7 @@ class Deviation(Frozen):
         counts : (bins,) int
             Numbers of points.
         limits : (bins + 1,) float
-            Limits between the bins, as lengths.
+            Limits between the bins, in the units of the scan.
 
         See Also
         --------
@@ -230,7 +230,7 @@ class Deviation(Frozen):
 
     @property
     def figures(self) -> dict[str, object]:
-        """Summary figures, ready for JSON."""
+        """Summary figures, ready for JSON: counts, shares from 0 to 1, and deviations in the units of the scan."""
         return {
             "points": len(self.of_surface),
             "mean": float(self.of_surface.mean()),
@@ -241,7 +241,7 @@ class Deviation(Frozen):
         }
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the deviations to a file, in the format given by its extension.
+        """Write the deviations, in the units of the scan, to a file in the format given by its extension.
 
         Parameters
         ----------

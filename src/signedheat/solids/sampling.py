@@ -54,7 +54,8 @@ def sample_distances(
     Returns
     -------
     Samples
-        Points, distances and gradients, with the centre and radius of the shape.
+        Points, distances and gradients, with the centre and radius of the shape. Distances are in the units of the
+        shape, and negative inside.
 
     Raises
     ------

@@ -66,7 +66,8 @@ class Solid(Displayed, Represented, Frozen):
     """A completed shape: its own faces, and those that close it.
 
     `complete` returns solids. Distance is to the nearest triangle, and a point is inside if its winding number is above
-    ½. Every function that takes a shape also takes a solid, and does not complete it again.
+    ½: how often the faces go around it, 1 inside a closed surface and 0 outside. Every function that takes a shape also
+    takes a solid, and does not complete it again.
 
     ``a | b``, ``a & b`` and ``a - b`` are the union, intersection and difference of two solids. Their triangles are cut
     where they cross and kept where they bound the result; open sheets are ignored. If one of the two is a `Field`,
@@ -83,7 +84,7 @@ class Solid(Displayed, Represented, Frozen):
     bounding : (m,) bool
         Whether a triangle has the inside behind it and the outside in front.
     windings : Windings
-        Winding numbers of the triangles that bound the inside.
+        Evaluates winding numbers of the triangles that bound the inside, at any point.
     source : TriangleMesh, optional
         Triangles of the input, to whose faces `origins` and barycentric coordinates refer; None if it was not a mesh.
     diagnostics : Diagnostics
@@ -143,7 +144,7 @@ class Solid(Displayed, Represented, Frozen):
 
     @property
     def bounds(self) -> Floats:
-        """(2, 3) lower and upper corner of the box around all triangles."""
+        """(2, 3) lower and upper corner of the box around all triangles, in the units of the shape."""
         points = self.triangles.reshape(-1, 3)
         return np.stack([points.min(axis=0), points.max(axis=0)])
 
@@ -250,6 +251,11 @@ class Solid(Displayed, Represented, Frozen):
         -------
         (...) bool
             True inside.
+
+        Raises
+        ------
+        GeometryError
+            If a point is not finite, or does not have three coordinates.
 
         See Also
         --------

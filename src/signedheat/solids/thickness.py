@@ -80,7 +80,7 @@ class Thickness(Frozen):
     mesh : TriangleMesh
         The boundary of the solid, facing outwards; large faces are cut.
     values : (m,) float
-        Thickness behind each face, NaN where no wall is opposite.
+        Thickness behind each face, in the units of the solid; NaN where no wall is opposite.
     origins : (m,) int
         Face of the shape that each face is part of; −1 in the completion.
 
@@ -109,7 +109,7 @@ class Thickness(Frozen):
 
     @cached_property
     def thinnest(self) -> tuple[float, Floats]:
-        """The least thickness, and (3,) the middle of the face where it is."""
+        """The least thickness, in the units of the solid, and the middle (3,) of the face where it is."""
         face = int(self._from_thin_to_thick[0])
         return float(self.values[face]), self.mesh.vertices[self.mesh.faces[face]].mean(axis=0)
 
@@ -119,7 +119,7 @@ class Thickness(Frozen):
         Parameters
         ----------
         least : float
-            A length, such as the thinnest wall that a printer makes.
+            A length in the units of the solid, such as the thinnest wall that a printer makes.
 
         Returns
         -------
@@ -150,7 +150,7 @@ class Thickness(Frozen):
         Returns
         -------
         (k,) float
-            Lengths.
+            Lengths, in the units of the solid.
 
         Raises
         ------
@@ -173,7 +173,7 @@ class Thickness(Frozen):
         return self.values[order[np.minimum(ranks, len(order) - 1)]]
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the map to a file, in the format given by its extension.
+        """Write the map, in the units of the solid, to a file in the format given by its extension.
 
         Parameters
         ----------

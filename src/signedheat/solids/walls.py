@@ -178,9 +178,10 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
 
 
 def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
-    """Estimate the area of the strip between a rim and another one, and of it as seen along the surface at the rim.
+    """Estimate two areas of a strip from a rim to another one: its own, and that by which it continues the surface.
 
-    The second is negative if the strip leads back over the surface. Each edge counts times the way from its middle.
+    The own area is the sum over edges of the rim of length times distance to the other rim. The second takes instead
+    the part of that way along `Rim.onward`, so it is negative if the strip leads back over the surface.
     """
     along = np.roll(rim.smooth, -1, axis=0) - rim.smooth
     lengths, places = np.linalg.norm(along, axis=1), other.smooth

@@ -117,7 +117,10 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
 
     @cached_property
     def vertex_places(self) -> tuple[Ints, Floats]:
-        """(n,) face of the mesh, and (n, 3) barycentric coordinates in it, of every vertex; face −1 where unused."""
+        """(n,) face of the mesh in which every vertex lies, −1 where unused, and (n, 3) barycentric coordinates there.
+
+        Barycentric coordinates are the weights, with sum 1, of the corners of a face.
+        """
         old = self.mesh.faces
         faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
         for k in range(3):
@@ -137,7 +140,7 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
 
     @cached_property
     def thin_faces(self) -> Ints:
-        """(k,) faces with an angle below the goal."""
+        """(k,) faces with an angle smaller than that which `intrinsic_delaunay` was asked for."""
         return np.flatnonzero(self.corner_angles.min(axis=1) < np.radians(self.goal) - 1e-9)
 
     @property
@@ -432,8 +435,11 @@ def intrinsic_delaunay(
     coarsest: float = np.inf,
     progress: Progress | None = None,
 ) -> IntrinsicTriangulation:
-    """Make an intrinsic Delaunay triangulation or refinement of a mesh: better angles, the same surface.
+    """Triangulate the same surface again with better angles, for accurate distance along it.
 
+    The new edges are straight lines on the surface, which may run over several faces of the mesh: they are known by
+    their lengths alone, hence *intrinsic*. Edges are flipped until the two angles opposite each one sum to at most
+    180°, which is the *Delaunay* condition and avoids needles. The surface does not change, nor do its vertices move.
     Boundary and nonmanifold edges are not flipped, and neither are the edges of kept curves; refinement may split them.
     The mesh may be nonmanifold, nonorientable, inconsistently oriented, and have nearly degenerate faces.
 
@@ -443,8 +449,8 @@ def intrinsic_delaunay(
         The surface.
     keep : Curve, SurfacePoints or a sequence of them
         Curves that are to run along edges, and points that are to be vertices; of the points of curves those are where
-        lines bend, end or meet. Or lists of (element, coordinates), as for `signed_distance`. Curves without length are
-        left out if there are others. Other sources can be used as well.
+        lines bend, end or meet. Or lists of (element, barycentric coordinates), as for `signed_distance`. Curves
+        without length are left out if there are others. Other sources can be used as well.
     refine : bool
         Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
         at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly

@@ -155,8 +155,9 @@ class TangentPlanes:
         return in_chunks(found, np.column_stack([here, there]))[0]
 
     def unfolded(self, here: Ints, there: Ints) -> Floats:
-        """(m, 2) places of points `there` (m,) in the planes of points `here` (m,), along the mean of both normals.
+        """(m, 2) coordinates of points `there` (m,) in the tangent planes of points `here` (m,), laid flat.
 
+        The height of a point along the mean of both normals is taken away, and the rest rotated into the plane.
         For points on the other side of a plate, the directions in which both sides end replace the normals.
         """
         known = self.points, self.normals, self.axes, self.outward, self.flat
@@ -213,7 +214,10 @@ def opposed_normals(points: Floats, normals: Floats, flat: Floats, ids: Ints) ->
 
 @compiled
 def _unfolded(points: Floats, normals: Floats, axes: Floats, outward: Floats, flat: Floats, pairs: Ints) -> Floats:
-    """(m, 2) places in the plane of the first point of each pair (m, 2) of the second: see `TangentPlanes.unfolded`."""
+    """For each pair (m, 2) of points, lay the second into the tangent plane of the first: `TangentPlanes.unfolded`.
+
+    Returns its coordinates (m, 2) along the two axes of the plane.
+    """
     result, middle, seen = np.empty((len(pairs), 2)), np.empty(3), np.empty(3)
     for row in range(len(pairs)):
         p, q = pairs[row]

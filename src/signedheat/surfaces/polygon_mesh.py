@@ -134,7 +134,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @property
     def volume(self) -> float:
-        """Volume inside a watertight mesh: see `TriangleMesh.volume`."""
+        """Volume inside a watertight mesh, in cubic units; negative if it faces inwards: see `TriangleMesh.volume`."""
         return self.triangulation.volume
 
     @property
@@ -160,7 +160,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @cached_property
     def polygon_area_vectors(self) -> Floats:
-        """(p, 3) vector areas, which depend on the boundary of the polygon only, planar or not."""
+        """(p, 3) area times mean normal, in square units: depends on the boundary of a polygon only, planar or not."""
         center = self.polygon_centroids[self.corner_polygons]
         a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
         return 0.5 * np.add.reduceat(np.cross(a, b), self.offsets[:-1], axis=0)

@@ -265,6 +265,7 @@ BYTES_OF_NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
+    """Return the discretization on the cloud's local triangles, with values at the points."""
     # h is the mean distance between neighbouring points, the scale below which they do not determine the surface
     refuse_too_many(
         2 * domain.n_points, domain.n_points, "points", more=BYTES_OF_NEIGHBORS + BYTES_PER_POINT * domain.n_points

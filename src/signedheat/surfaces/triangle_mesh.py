@@ -91,12 +91,12 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def face_area_vectors(self) -> Floats:
-        """(m, 3) area times unit normal."""
+        """(m, 3) area times unit normal, in square units."""
         return area_vectors(self.vertices[self.faces])
 
     @cached_property
     def face_areas(self) -> Floats:
-        """(m,) areas."""
+        """(m,) areas, in square units."""
         return np.linalg.norm(self.face_area_vectors, axis=1)
 
     @property
@@ -170,7 +170,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def edge_lengths(self) -> Floats:
-        """(e,) lengths, in the order of `edges`."""
+        """(e,) lengths, in the units of the vertices and in the order of `edges`."""
         tail, head = self.edges.vertices.T
         return np.linalg.norm(self.vertices[head] - self.vertices[tail], axis=1)
 
@@ -181,23 +181,23 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def places(self) -> Ints:
-        """(n,) for each boundary vertex the first one at its position, as along seams; for all others themselves."""
+        """(n,) id of the first boundary vertex at the position of each, as along seams; its own id if it is inside."""
         return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel(), SEAM_UNITS)
 
     @cached_property
     def joined(self) -> TriangleMesh:
-        """The same faces, with one vertex for boundary vertices at the same place."""
+        """The same faces, in which boundary vertices at one position are one vertex, by `places`."""
         whole = (self.places == np.arange(self.n_vertices)).all()
         return self if whole else TriangleMesh(self.vertices, self.places[self.faces])
 
     @cached_property
     def first_copies(self) -> Ints:
-        """(k,) the faces that are no copies of earlier ones, however these are turned."""
+        """(k,) ids of the faces that do not have the same three vertices as an earlier one, in whatever order."""
         return np.unique(copied_faces(self.faces, self.n_vertices))
 
     @cached_property
     def once(self) -> TriangleMesh:
-        """The mesh with those faces alone."""
+        """The mesh without faces that are given again: with those of `first_copies` alone."""
         kept = self.first_copies
         return self if len(kept) == self.n_faces else TriangleMesh(self.vertices, self.faces[kept])
 

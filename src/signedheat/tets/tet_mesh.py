@@ -110,7 +110,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
 
     @property
     def tet_volumes(self) -> Floats:
-        """(m,) volumes."""
+        """(m,) volumes, in cubic units."""
         return self.geometry.volumes
 
     @cached_property
