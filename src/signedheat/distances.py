@@ -166,18 +166,19 @@ def signed_distance(
     resolution : int
         Nodes along the longest side of the default grid; 128 by default.
     spacing : float or (d,) float, optional
-        Distance between nodes of the default grid, in place of `resolution`.
+        Distance between nodes of the default grid, in the units of the shape, in place of `resolution`.
     padding : float, optional
         Room around the shape, in its units; by default a fifth of its longest side.
     band : float, optional
-        In space: compute only nodes of the grid whose distance is at most this length, for fine grids.
+        In space: compute only nodes of the grid whose distance is at most this length, in the units of the shape.
     completion, lids, nested : str
         In space: see `complete`. With ``completion="none"``, distance is unsigned and only to what is there, also on
         surfaces and in the plane: for clothes, and for networks of curves.
     constraint : Free, ZeroSet or Soft, optional
         Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float, optional
-        τ in ``t = τ h²``, 1 by default, if the signed heat method is used; larger values close gaps more roundly.
+        If the signed heat method is used: τ in ``t = τ h²``, the time for which normals of the source are diffused like
+        heat, h being the size of cells or triangles; 1 by default. Larger values close gaps more roundly.
     fill : {"nonzero", "evenodd"}
         In the plane: the filling rule of closed outlines, as in SVG.
     as_oriented : bool

@@ -117,6 +117,7 @@ class _Morphology(Protocol):
 
 
 def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
+    """Make a function public, with a result whose type depends on that of the shape."""
     return cast("_Morphology", public_call(function))
 
 
@@ -191,7 +192,7 @@ def erode(
     Parameters
     ----------
     shape : shape, curves or polylines
-        As for `dilate`, and so are all errors.
+        As for `dilate`.
     distance : float
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
@@ -205,6 +206,17 @@ def erode(
     -------
     TriangleMesh, or list of Polyline or Curve
         The new boundary: closed, manifold, oriented like the shape.
+
+    Raises
+    ------
+    SignedHeatError
+        If the distance is not a finite nonnegative number.
+    SourceError
+        If the shape does not fit the domain.
+    UnsupportedTypeError
+        If a resolution is given beside a domain.
+    OutsideError
+        If the result is empty, or leaves the domain.
 
     See Also
     --------
@@ -236,7 +248,7 @@ def opening(
     Parameters
     ----------
     shape : shape, curves or polylines
-        As for `dilate`, and so are all errors.
+        As for `dilate`.
     distance : float
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
@@ -250,6 +262,17 @@ def opening(
     -------
     TriangleMesh, or list of Polyline or Curve
         The new boundary: closed, manifold, oriented like the shape.
+
+    Raises
+    ------
+    SignedHeatError
+        If the distance is not a finite nonnegative number.
+    SourceError
+        If the shape does not fit the domain.
+    UnsupportedTypeError
+        If a resolution is given beside a domain.
+    OutsideError
+        If the result is empty, or leaves the domain.
 
     See Also
     --------
@@ -280,7 +303,7 @@ def closing(
     Parameters
     ----------
     shape : shape, curves or polylines
-        As for `dilate`, and so are all errors.
+        As for `dilate`.
     distance : float
         The offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
@@ -294,6 +317,17 @@ def closing(
     -------
     TriangleMesh, or list of Polyline or Curve
         The new boundary: closed, manifold, oriented like the shape.
+
+    Raises
+    ------
+    SignedHeatError
+        If the distance is not a finite nonnegative number.
+    SourceError
+        If the shape does not fit the domain.
+    UnsupportedTypeError
+        If a resolution is given beside a domain.
+    OutsideError
+        If the result is empty, or leaves the domain.
 
     See Also
     --------

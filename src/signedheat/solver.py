@@ -234,7 +234,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return to_field(discretization, values, source, diagnostics)
 
     def _prepared(self, sources: Sources, constraint: Constraint) -> _Prepared:
-        """Prepare sources for diffusion, and warn of curves that have one side only."""
+        """Return the discretization adapted to sources, these on it for each diffusion time, notes and the constraint.
+
+        Curves that have one side only are warned of.
+        """
         listed, left_out = given_curves(self.domain, as_list(sources))
         kept = numbers_kept(len(listed), left_out)
         _warn_of_one_sided_curves(self.domain, listed, kept)

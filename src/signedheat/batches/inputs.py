@@ -112,6 +112,7 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
 
 
 def _fail(error: OSError) -> None:
+    """Raise the error that a walk over folders met, which it would pass over."""
     raise error  # shapes in a folder that cannot be read must not be skipped silently
 
 

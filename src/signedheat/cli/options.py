@@ -83,6 +83,7 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _print_message(self, message: str, file: object = None) -> None:
+        """Print help by `write_out`, whatever the file."""
         write_out(message.rstrip("\n"))  # only help and version; errors go through `error`
 
 

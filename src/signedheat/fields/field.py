@@ -374,17 +374,17 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return Field(domain, self.values[: domain._values_shape[0]], self.diagnostics, source=self.source)
 
     def expand(self) -> Field[FieldDomain]:
-        """Give φ on a domain in space that has all its detail, to draw, save or measure.
+        """Convert to a field on a plain grid or mesh that keeps all detail, to draw, save or measure.
 
-        A band becomes its whole grid, with nodes beyond it interpolated from the coarse field. An intrinsic
-        triangulation, also that of `finer`, becomes the flat polygons into which it and its mesh cut one another
-        (`common_subdivision`). A cut surface becomes a mesh whose vertices are doubled along the cut; elsewhere these
-        have the mean of the values of the corners there.
+        A band of nodes near the surface becomes its whole grid; other nodes are interpolated from the coarse field. An
+        intrinsic triangulation, whose edges cross faces of its mesh, becomes the flat polygons into which both cut one
+        another (`common_subdivision`); so it does where `finer` holds it. On the cut surface of `piecewise_distance`,
+        the vertices along the cut are doubled, so that φ can jump.
 
         Returns
         -------
         Field
-            This field itself on any other domain.
+            With values in the same units; on any other domain, this field itself.
 
         See Also
         --------

@@ -353,12 +353,12 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     level : float, optional
         Voxels with larger values are inside. Without it the image must have booleans, or zeros and ones.
     radius : float, optional
-        Passed to `DigitalSurface`.
+        Radius within which normals are estimated, as for `DigitalSurface`.
 
     Returns
     -------
     DigitalSurface
-        The boundary of the voxels.
+        The boundary of the voxels, in the units of the file.
 
     Raises
     ------

@@ -149,7 +149,7 @@ def _face_edges(faces: Ints) -> Ints:
 
 
 def _crossed_faces(edges: NDArray[np.int32]) -> NDArray[np.int8]:
-    """Return (c, 6) the number of crossed edges of each face."""
+    """Return (c, 6) how many edges of each face of each cell the surface crosses; edges it does not cross are −1."""
     crossed, kinds = _kinds(edges >= 0)
     return crossed[:, _face_edges(np.arange(6))].sum(axis=2, dtype=np.int8)[kinds]
 

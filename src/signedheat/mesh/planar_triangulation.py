@@ -352,7 +352,7 @@ def _legalize(mesh: Planar, i: int) -> None:
 
 @compiled
 def _improve(mesh: Planar) -> None:
-    """Flip edges that are not Delaunay."""
+    """Flip edges of a triangulation in place until all are Delaunay, but for fixed ones."""
     adj, fixed = mesh.adj, mesh.fixed
     for _ in range(64):  # most faces need three passes
         flips = 0

@@ -207,7 +207,10 @@ class FaceTree:
 
 @compiled
 def _discs(corners: Floats, tree: BoxTree) -> Floats:
-    """Compute `FaceTree.discs`. Discs are convex, so that it is enough that they contain the corners of the faces."""
+    """Compute `FaceTree.discs`: for each node of the tree, a flat disc that contains all of its faces.
+
+    Discs are convex, so it is enough that they contain the corners. Returns (2 · leaves, 8) numbers.
+    """
     bounds, items = tree.bounds, tree.items
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)

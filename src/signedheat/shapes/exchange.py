@@ -274,7 +274,14 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            A shape of the class on which this was called.
+            A shape of the class on which this was called, with the same coordinates.
+
+        Raises
+        ------
+        UnsupportedTypeError
+            If it is no such object of trimesh.
+        GeometryError
+            If it has no faces and the class needs them, or a coordinate is not finite.
 
         See Also
         --------
@@ -290,12 +297,19 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_trimesh(thing))
 
     def to_trimesh(self) -> Trimesh:
-        """Convert to trimesh.
+        """Convert to an object of trimesh.
 
         Returns
         -------
         trimesh.Trimesh or trimesh.PointCloud
-            Not processed: vertices and faces keep their order.
+            With the same coordinates, vertices and faces in the same order: trimesh merges nothing.
+
+        Raises
+        ------
+        MissingPackageError
+            If trimesh is not installed.
+        GeometryError
+            If faces have more than three corners.
 
         See Also
         --------
@@ -326,7 +340,14 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            A shape of the class on which this was called.
+            A shape of the class on which this was called, with the same coordinates.
+
+        Raises
+        ------
+        UnsupportedTypeError
+            If it is no such object of PyVista.
+        GeometryError
+            If it has no faces and the class needs them, or a coordinate is not finite.
 
         See Also
         --------
@@ -363,7 +384,14 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            A shape of the class on which this was called.
+            A shape of the class on which this was called, with the same coordinates.
+
+        Raises
+        ------
+        UnsupportedTypeError
+            If it is no such object of meshio.
+        GeometryError
+            If it has no faces and the class needs them, or a coordinate is not finite.
 
         See Also
         --------
@@ -380,12 +408,17 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_meshio(thing, as_points=not cls._has_faces))
 
     def to_meshio(self) -> meshio.Mesh:
-        """Convert to meshio.
+        """Convert to a mesh of meshio.
 
         Returns
         -------
         meshio.Mesh
-            The normals of points are point data ``nx``, ``ny``, ``nz``.
+            With the same coordinates; the normals of points are point data ``nx``, ``ny``, ``nz``.
+
+        Raises
+        ------
+        MissingPackageError
+            If meshio is not installed.
 
         See Also
         --------
@@ -425,7 +458,14 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Returns
         -------
         TriangleMesh, PolygonMesh or PointCloud
-            A shape of the class on which this was called.
+            A shape of the class on which this was called, with the same coordinates.
+
+        Raises
+        ------
+        UnsupportedTypeError
+            If it is no such object of Open3D.
+        GeometryError
+            If it has no faces and the class needs them, or a coordinate is not finite.
 
         See Also
         --------
@@ -439,12 +479,19 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_open3d(thing))
 
     def to_open3d(self) -> open3d.geometry.Geometry:
-        """Convert to Open3D.
+        """Convert to an object of Open3D.
 
         Returns
         -------
         open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
-            In double precision.
+            With the same coordinates, in double precision, and normals of points.
+
+        Raises
+        ------
+        MissingPackageError
+            If Open3D is not installed.
+        GeometryError
+            If faces have more than three corners.
 
         See Also
         --------

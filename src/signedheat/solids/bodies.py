@@ -148,7 +148,7 @@ def whole_boundary(triangles: Floats, windings: Windings, mesh: TriangleMesh | N
 
 
 def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None) -> Iterator[Floats]:
-    """Yield one boundary after the other."""
+    """Yield (k, 3, 3) triangles that may bound the solid, the best way to unite its bodies first."""
     for given in (mesh, None) if mesh is not None else (None,):
         bodies = Bodies.of_chain(windings) if given is None else Bodies.of_mesh(given, windings)
         united = None if bodies is None else bodies.united

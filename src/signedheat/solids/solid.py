@@ -720,6 +720,7 @@ class Solid(Displayed, Represented, Frozen):
         return self.field(grid=domain)
 
     def _surface_on(self, field: Field[Grid[Literal[3]]], level: float) -> TriangleMesh:
+        """Return the contour at a level from a field of distances that is there already, with sharp edges."""
         # as blocks of the grid hold them, so that both ways give the same mesh
         heights = field.values.astype(np.float32).astype(np.float64) - level
         rounded = heights.astype(np.float32).astype(np.float64)
@@ -734,11 +735,16 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         trimesh.Trimesh
-            All faces, including the completion and sheets (`boundary`).
+            All faces, including the completion and sheets (`boundary`), in the units of the shape.
+
+        Raises
+        ------
+        MissingPackageError
+            If trimesh is not installed.
 
         See Also
         --------
-        Solid.surface : The surface that is converted.
+        Solid.surface : The closed surface, without sheets.
 
         Examples
         --------

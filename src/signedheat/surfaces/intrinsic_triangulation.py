@@ -195,14 +195,14 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         return np.einsum("pk,pkd->pd", barycentric, self.mesh.vertices[self.mesh.faces[self._existing(faces)]])
 
     def locate(self, faces: ArrayLike, barycentric: ArrayLike) -> tuple[Ints, Floats]:
-        """Locate points of the mesh on the triangulation.
+        """Convert points given in faces of the mesh to points in faces of the triangulation.
 
         Parameters
         ----------
         faces : (p,) int
             Faces of the mesh.
         barycentric : (p, 3) float
-            Barycentric coordinates of the points in these faces.
+            Barycentric coordinates of the points in these faces: weights of the three corners, with sum 1.
 
         Returns
         -------

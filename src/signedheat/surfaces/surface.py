@@ -406,25 +406,27 @@ class Surface(Frozen, LinearDomain):
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
-        """Find a level set of a function that is linear between vertices, oriented so that φ grows with the function.
+        """Find the curves on which a function takes a value; it is linear between vertices, and larger to their left.
 
         Parameters
         ----------
         values : (n_vertices,) float
             The function; faces with a NaN corner are skipped.
         level : float
-            The level.
+            The value, in the units of the function.
 
         Returns
         -------
         list of Curve
-            One for each connected component, open or closed; larger values are to its left. Curves cross seams if the
-            function agrees on both sides of all of them.
+            One for each connected component, open or closed; none if the function does not take the value. Curves cross
+            seams, edges at which vertices are given twice, if the function agrees on both sides of all of them.
 
         Raises
         ------
         SourceError
             If there is not one value per vertex.
+        SignedHeatError
+            If the level is not finite.
 
         See Also
         --------

@@ -63,6 +63,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @classmethod
     def _of(cls, elements: Elements) -> TriangleMesh:
+        """Make a mesh of the points and triangles of a converted shape; polygons have been triangulated."""
         return cls(elements.points, elements.triangles)
 
     @property

@@ -253,6 +253,7 @@ class TetIntegration(SpringIntegration):
         return super().penalize(divergence - pull, source, strength)
 
     def _at_samples(self, values: Floats, source: SourceTerm) -> Floats:
+        """Return values at the samples of a source, to second order."""
         return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
     def _quadratic_correction(self, values: Floats, source: SourceTerm) -> Floats:
