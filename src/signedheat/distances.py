@@ -177,8 +177,8 @@ def signed_distance(
     constraint : Free, ZeroSet or Soft, optional
         Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float, optional
-        If the signed heat method is used: τ in ``t = τ h²``, the time for which normals of the source are diffused like
-        heat, h being the size of cells or triangles; 1 by default. Larger values close gaps more roundly.
+        τ in ``t = τ h²``, 1 by default, if the signed heat method is used. For this time normals of the source are
+        diffused like heat, with h the size of cells or triangles. Larger values close gaps more roundly.
     fill : {"nonzero", "evenodd"}
         In the plane: the filling rule of closed outlines, as in SVG.
     as_oriented : bool

@@ -120,6 +120,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return self._made(None, self._discretized)
 
     def _discretized(self) -> Adaptable:
+        """Return the discretization of the domain: on it, on a refinement of it, or on one for each set of sources."""
         report = within(self.progress, 0.2, 0.4)
         if self.intrinsic == "auto":
             return lowered_by_angles(self.domain, report)
@@ -172,10 +173,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Parameters
         ----------
         sources : one source or a sequence of them
-            On surfaces: `Curve`, `SurfacePoints`, or potpourri3d's lists of (element, coordinates). In space:
-            `TriangleMesh`, `PolygonMesh`, `PointCloud`. In the plane: `Polyline`.
+            On surfaces: `Curve`, `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In
+            space: `TriangleMesh`, `PolygonMesh`, `PointCloud`. In the plane: `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Constraint on φ at the sources; `ZeroSet` by default, which makes them its zero set.
+            Values that φ is to have at the sources, see `constraints`. By default `ZeroSet`, zero on all of them.
 
         Returns
         -------

@@ -271,9 +271,11 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         return self.shape
 
     def _interpolant(self, values: Floats, beyond: Exact | None) -> GridInterpolant:
+        """Return the function that interpolates values at the nodes; no other field lies beyond a whole grid."""
         return GridInterpolant(self, values)
 
     def _clipped(self, points: ArrayLike) -> Floats:
+        """Return for each point (..., d) the nearest point of the grid's box."""
         places, shape = query_points(points, self.dimension)
         return np.clip(places, self.origin, self.upper).reshape(*shape, self.dimension)
 

@@ -121,6 +121,7 @@ def _inspect_tets(mesh: TetMesh) -> TetReport:
 
 
 def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
+    """Count what is wrong with a mesh, such as open edges, edges of several faces, and copies of faces."""
     if isinstance(mesh, TriangleMesh):
         corners, offsets = mesh.faces.ravel(), np.arange(0, 3 * mesh.n_faces + 1, 3)
     else:

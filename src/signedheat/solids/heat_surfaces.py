@@ -108,7 +108,10 @@ def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats
 
 
 def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
-    """Interpolate values on a wall's lattice to the nodes next to the wall."""
+    """Interpolate values on the coarse lattice of a wall of a grid's box, linearly, to the nodes next to the wall.
+
+    `shape` is that of the grid, and `axis` the one across the wall.
+    """
     for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
         place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
         below = np.minimum(place.astype(np.int64), values.shape[d] - 2)

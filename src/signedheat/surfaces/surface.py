@@ -197,12 +197,12 @@ class Surface(Frozen, LinearDomain):
         return SurfaceInterpolant(self.triangulation, self.on_triangulation(values))
 
     def on_triangulation(self, values: Floats) -> Floats:
-        """Extend values at the vertices of the domain to the vertices of `triangulation`.
+        """Extend values at the vertices of the surface to its `triangulation`, the same surface in triangles.
 
         Parameters
         ----------
         values : (n,) float
-            One for each vertex of the domain.
+            One for each vertex of the surface.
 
         Returns
         -------
@@ -445,7 +445,7 @@ class Surface(Frozen, LinearDomain):
         return level_set(mesh.joined if seams_agree else mesh, at_corners, height)
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
-        """Find the boundary of a region of faces, with the region to the left, so that φ > 0 in it.
+        """Find the boundary of a region of faces, with the region to its left, where distance to it is positive.
 
         Parameters
         ----------
