@@ -297,6 +297,7 @@ def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDA
 
 
 def _write_vertex_npz(field: Field[SurfaceShape], path: PathLike) -> None:
+    """Write values at vertices, and the mesh or cloud that they are on, as arrays of an ``.npz`` file."""
     domain = field.domain
     arrays: dict[str, Any] = {"values": field.values, "vertices": elements(domain).points}
     if isinstance(domain, TriangleMesh):

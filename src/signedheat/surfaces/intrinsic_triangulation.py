@@ -169,7 +169,7 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         faces : (p,) int
             Faces of the mesh.
         barycentric : (p, 3) float
-            Barycentric coordinates of the points in these faces.
+            Barycentric coordinates of the points in these faces: weights of the three corners, with sum 1.
 
         Returns
         -------

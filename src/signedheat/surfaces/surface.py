@@ -207,7 +207,7 @@ class Surface(Frozen, LinearDomain):
         Returns
         -------
         (m,) float
-            One for each vertex of the triangulation, which may have further ones inside polygons.
+            One for each vertex of the triangulation; at further ones in polygons, interpolated from the corners.
 
         See Also
         --------

@@ -201,7 +201,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         Parameters
         ----------
         point_data : mapping, optional
-            Arrays at the vertices, by name.
+            Arrays with one row for each vertex, by name.
 
         Returns
         -------
