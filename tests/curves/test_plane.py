@@ -101,6 +101,23 @@ def test_spikes_and_clefts_have_sides(width, seed):
     np.testing.assert_array_equal(found < 0, inside)
 
 
+@pytest.mark.parametrize("gap", [1e-10, 1e-9, 2e-9, 1e-8])
+def test_corners_that_nearly_meet_have_sides(gap):
+    rng = np.random.default_rng(0)
+    places, sizes = np.array([[-0.5, 0], [0.45, 0.1]]), np.array([0.3, 0.35])
+    square = np.concatenate(
+        [SQUARE[k] + np.linspace(0, 0.9, 10)[:, None] * (SQUARE[k - 1] - SQUARE[k]) for k in (0, 3, 2, 1)]
+    )
+    open_square = np.vstack([square, square[-1] + (1 - gap) * (square[0] - square[-1])])
+    outlines = [place + size * open_square for place, size in zip(places, sizes, strict=True)]
+    lattice = np.stack(np.meshgrid(*[np.linspace(-1, 1, 41)] * 2), axis=2).reshape(-1, 2)
+    points = np.concatenate([lattice, rng.uniform(-1.5, 1.5, (4000, 2))])
+    found = sh.signed_distance([sh.Polyline(outline) for outline in outlines], resolution=16).closest(points).distances
+    inside = (np.abs(points[:, None] - places) < sizes[:, None]).all(axis=2).any(axis=1)
+    away = np.abs(found) > 1e-6
+    np.testing.assert_array_equal(found[away] < 0, inside[away])
+
+
 def is_inside(corners, x, y):
     """Whether a point is inside an outline, without rounding."""
     meetings = 0

@@ -322,19 +322,18 @@ class Drawing(Frozen):
         corners, sums, counts = self._corners
         ends = self.lines[nearest]
         along = ends[:, 1] - ends[:, 0]
-        normals = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        at_corner, crowded = np.zeros((2, len(points)), dtype=bool)
+        normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
+        crowded = np.zeros(len(points), dtype=bool)
         reach = 1e-9 * np.linalg.norm(along, axis=1)
         for end in range(2):
             is_end = np.linalg.norm(places - ends[:, end], axis=1) <= reach
             corner = corners[nearest, end]
             normals = np.where(is_end[:, None], sums[corner], normals)
-            at_corner |= is_end
             crowded |= is_end & (counts[corner] > 2)
         heights = ((points - places) * normals).sum(axis=1)
         sides = np.where(heights < 0, -1.0, 1.0)
-        crowded |= at_corner & (np.abs(heights) <= LEAST_SLOPE * np.linalg.norm(points - places, axis=1))
-        if self.phi is None and crowded.any():  # outlines touch there, or their normals cancel, as at spikes
+        crowded |= np.abs(heights) <= LEAST_SLOPE * np.linalg.norm(points - places, axis=1)
+        if self.phi is None and crowded.any():  # outlines touch, normals cancel at spikes, or corners are near
             sides[crowded] = np.where(_enclosed(self.lines, points[crowded]), -1.0, 1.0)
         return sides
 
