@@ -33,7 +33,7 @@ FIELDS = {
 WORDS = {
     "nested": [partial(sh.orientation, BALL), partial(sh.complete, BALL), partial(sh.signed_distance, BALL, GRID)],
     "lids": [partial(sh.complete, BALL), partial(sh.signed_distance, BALL, GRID)],
-    "completion": [partial(sh.complete, BALL)],
+    "completion": [partial(sh.complete, BALL), partial(sh.signed_distance, BALL, GRID)],
     "corners": [partial(sh.offset, BALL, 0.1), partial(SOLID.offset, 0.1)],
     "side": [partial(sh.morphology.thicken, BALL, 0.1)],
     "fill": [partial(sh.signed_distance, LINE, PLANE)],
@@ -45,7 +45,9 @@ WORDS = {
 
 @pytest.mark.parametrize("name", WORDS)
 @pytest.mark.parametrize(
-    "word", ["abc", "", "Round", None, 3.0, b"round", ["round"], {}, np.zeros(3), np.nan], ids=repr
+    "word",
+    ["abc", "", "Round", None, 3.0, b"round", ["round"], {}, np.zeros(3), np.zeros(2, "f8,f8"), np.nan],
+    ids=repr,
 )
 def test_words(name, word):
     for call in WORDS[name]:

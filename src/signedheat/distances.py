@@ -248,7 +248,7 @@ def signed_distance(
     options = {name: given[name] for name, default in DEFAULTS.items() if given[name] is not default}
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
-    if options.get("completion") == "none":
+    if isinstance(completion, str) and completion == "none":  # arrays compare element by element
         if measure is distance_to_lines:
             measure = unsigned_distance_to_lines
         elif measure is distance_to_curves:

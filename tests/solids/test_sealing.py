@@ -103,3 +103,15 @@ def test_lengths_that_are_none():
     for length in (0.0, -1.0, np.nan, "x"):
         with refused(sh.SignedHeatError, element="seal"):
             sh.complete(OUTER, seal=length)
+
+
+def test_lengths_far_from_the_size_of_the_shape():
+    volume = sh.complete(OUTER).volume
+    for length in (1e13, 1e40):
+        assert sh.complete(OUTER, seal=length).volume == pytest.approx(volume, rel=1e-12)
+    for length in (5e-324, 1e-310, 1e160, 1.7e308):
+        with refused(sh.errors.GeometryError, element="seal"):
+            sh.complete(OUTER, seal=length)
+    for length in (1e-40, 1e-10):
+        with pytest.raises(sh.errors.MemoryLimitError, match="seal wider openings"):
+            sh.complete(OUTER, seal=length)

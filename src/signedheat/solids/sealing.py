@@ -14,7 +14,7 @@ import scipy
 
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import LeftOut
-from ..errors import SourceError
+from ..errors import GeometryError, SourceError
 from ..grids.blocks import BLOCK
 from ..memory import refuse_beyond_memory
 from ..mesh.arrangement import arranged
@@ -25,6 +25,7 @@ from ..mesh.unit_vectors import unit
 from ..parallel import PointTree
 from ..search.face_tree import FaceTree
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import LARGEST_COORDINATE, SMALLEST_EXTENT
 
 CELLS_PER_OPENING = 6.0
 """Cells of the grid across the narrowest opening that is passed."""
@@ -55,13 +56,14 @@ class Flood:
         """Flood the surroundings of (m, 3, 3) triangles by a ball with this diameter."""
         radius, spacing = 0.5 * length, length / CELLS_PER_OPENING
         lower = triangles.min(axis=(0, 1)) - radius - 3 * spacing
-        blocks = np.ceil((triangles.max(axis=(0, 1)) + radius + 3 * spacing - lower) / (BLOCK * spacing)).astype(int)
+        counts = np.ceil((triangles.max(axis=(0, 1)) + radius + 3 * spacing - lower) / (BLOCK * spacing))
         refuse_beyond_memory(
             f"sealing openings of {length:.3g}",
-            int(np.prod(blocks.astype(float) * BLOCK)),
+            int(np.prod(counts * BLOCK)),
             lambda n: BYTES_OF_FLOOD * n,
             lambda _: "seal wider openings only",
         )
+        blocks = counts.astype(int)
         tree = FaceTree.of_triangles(triangles)
         free = np.zeros((*blocks, BLOCK, BLOCK, BLOCK), dtype=bool)
         corners = np.stack(np.meshgrid(*map(np.arange, blocks), indexing="ij"), axis=-1).reshape(-1, 3) * BLOCK
@@ -100,6 +102,12 @@ def sealed(mesh: TriangleMesh, length: float) -> tuple[TriangleMesh, Ints, LeftO
 
     Faces are cut where they cross. Also returned are the (k,) faces that they are parts of, and what was left out.
     """
+    if not SMALLEST_EXTENT <= length <= LARGEST_COORDINATE:
+        raise GeometryError(
+            f"seal is {length:g}, and lengths from {SMALLEST_EXTENT:g} to {LARGEST_COORDINATE:g} can be computed with",
+            remedy="seal openings of about the size of the shape or less",
+            element="seal",
+        )
     pieces = arranged(mesh.vertices, mesh.faces)
     triangles = pieces.points[pieces.faces]
     flood = Flood.around(triangles, length)
