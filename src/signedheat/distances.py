@@ -349,7 +349,7 @@ def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
 
 
 def _without_sides(source: Any) -> Any:
-    """Return curves, and sequences of them, without sides: distance to them is unsigned, and completes nothing."""
+    """Return curves, or sequences of them, as unoriented ones, so that distance has no sign; others as they are."""
     if isinstance(source, Curve):
         return Curve(source.faces, source.barycentric, source.closed, oriented=False)
     if isinstance(source, Sequence) and all(isinstance(item, Curve | SurfacePoints | Sequence) for item in source):

@@ -535,7 +535,7 @@ def thicken(
     sheet : TriangleMesh or PolygonMesh
         A surface, with boundary or not. If both sides get the same thickness, its orientation does not matter.
     above : float
-        Thickness on each side.
+        Thickness on each side, in the units of the sheet.
     below : float, optional
         Thickness behind the faces, if it differs; `above` is then the thickness on the side of their normals.
     domain : Grid, optional

@@ -152,7 +152,11 @@ def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> 
 
 
 def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh:
-    """Make a triangle soup: each face gets three vertices of its own, and is moved by about `jitter`."""
+    """Make a triangle soup: the same triangles, but none shares a vertex with another.
+
+    Each triangle is moved at random as a whole; `jitter` is the standard deviation of each of its coordinates, in
+    the units of the mesh.
+    """
     corners = mesh.vertices[mesh.faces]
     corners = corners + np.random.default_rng(seed).normal(scale=jitter, size=(mesh.n_faces, 1, 3))
     return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))

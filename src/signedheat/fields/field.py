@@ -406,12 +406,12 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self if domain is self.domain else Field(domain, values, self.diagnostics, solid=self.solid)
 
     def plain(self) -> Field[FieldDomain]:
-        """Give φ on a domain that files and viewers know: the faces of voxels, or what `restrict` or `expand` return.
+        """Return the field on a domain that files and viewers know, such as the faces of voxels, or a full grid.
 
         Returns
         -------
         Field
-            This field itself if its domain is one.
+            This field itself if files and viewers know its domain already.
 
         See Also
         --------
@@ -647,7 +647,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Parameters
         ----------
         values : array
-            In the shape of `values`.
+            As many as this field has, in the same shape.
 
         Returns
         -------

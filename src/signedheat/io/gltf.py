@@ -152,7 +152,7 @@ def _read_scene(path: PathLike) -> _Scene:
 
 
 def _named(tree: dict[str, Any], kind: str, index: object) -> dict[str, Any]:
-    """Return an entry of a list of the scene by its index, which must exist."""
+    """Return entry `index` of the list `kind` of the scene, such as "meshes"; raise if there is none."""
     entries, number = tree.get(kind, []), integer(index, f"index of {kind}")
     if number >= len(entries):
         raise damaged(f"it names number {number} of its {len(entries)} {kind}", element=f"{kind} {number}")

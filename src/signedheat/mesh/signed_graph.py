@@ -69,12 +69,12 @@ def best_signs(weights: Floats, first: Floats) -> Floats:
     for _, merged, _ in _contractions(_weights(links, n)):
         levels.append(merged[levels[-1]])
     groups = [np.flatnonzero(level == group) for level in levels for group in range(int(level.max()) + 1)]
-    candidates = [_turned_in_groups(weights, groups, start.copy()) for start in starts]
+    candidates = [_flipped_in_groups(weights, groups, start.copy()) for start in starts]
     return max(candidates, key=lambda signs: float(signs @ weights @ signs))
 
 
-def _turned_in_groups(weights: Floats, groups: list[Ints], signs: Floats) -> Floats:
-    """Turn groups of signs one after the other, as long as that makes them agree more with the others."""
+def _flipped_in_groups(weights: Floats, groups: list[Ints], signs: Floats) -> Floats:
+    """Return the (n,) signs after negating, one after the other, each group that then agrees more with the rest."""
     agreement, least = weights @ signs, 1e-12 * float(np.abs(weights).sum())
     for _ in range(TURNING_ROUNDS):
         turned = False

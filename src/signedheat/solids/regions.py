@@ -103,9 +103,10 @@ def _faults(pieces: Arrangement, regions: Regions, closing: Bools) -> int:
 def _windings(
     points: Floats, faces: Ints, normals: Floats, times: Ints, windings: Windings, steps: Floats
 ) -> tuple[Floats, int]:
-    """(m, 2) winding numbers behind and in front of each distinct face, given its multiplicity; and contradictions.
+    """Return (m, 2) winding numbers behind and in front of each distinct face, and how many pairs of sides contradict.
 
-    Sides of wide faces are probed at least their (m,) steps away.
+    `times` says how often each face is there, opposite copies counted as −1. Sides of wide faces are probed
+    at least their (m,) steps away.
     """
     n = len(faces)
     sides, facing_sides = _around_edges(points, faces, normals, times)
@@ -130,10 +131,10 @@ def _windings(
 
 
 def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> tuple[Ints, Ints]:
-    """Pairs of sides that face each other around edges, clearest first; 2 f is behind face f, 2 f + 1 in front.
+    """Return two (k,) arrays: sides of faces that enclose the same space at an edge, the most certain pairs first.
 
-    Edges at which faces do not balance are left out: they are rims of open surfaces, where nothing is known. Directions
-    across edges come from the planes that faces are pieces of, so that slivers have them, too.
+    Side 2 f is behind face f, side 2 f + 1 in front of it. Boundary edges of open surfaces are left out, as nothing
+    is known there. Directions across edges come from the planes of faces, so that thin triangles have them, too.
     """
     table = edge_table(faces)
     halfedges = table.pairs[(_ways(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]

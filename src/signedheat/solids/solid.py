@@ -542,7 +542,7 @@ class Solid(Displayed, Represented, Frozen):
         near : float
             Fraction of the points near the surface.
         widths : sequence of float
-            Standard deviations of the noise, relative to the radius of the shape.
+            Standard deviations of the distance of those points, relative to the radius of the shape.
         seed : int
             Seed of the random numbers.
 

@@ -132,14 +132,14 @@ class Curve(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class SurfacePoints(Frozen):
-    """Isolated points on a surface; φ grows away from each.
+    """Isolated points on a surface, from each of which distance grows in all directions.
 
     Parameters
     ----------
     faces : (n,) int
         Face that each point lies in; any face that contains the point.
     barycentric : (n, 3) float
-        Barycentric coordinates in that face.
+        Weights of the three corners of that face, which add up to 1.
 
     Raises
     ------
