@@ -125,9 +125,9 @@ def orientation(
 
     Vertices that coincide up to rounding count as one, and so do faces on the same corners. A closed part whose faces
     agree is kept, or flipped as a whole to face outwards. Other faces are made to agree with their neighbours across
-    edges of two faces. Walls between closed cells are left out (`inner_walls`). How often all
-    faces go around a point, their winding number, decides which way each connected patch faces, and which patches are
-    sheets that enclose nothing.
+    edges of two faces. Walls between closed cells are left out (`inner_walls`). How often all faces go around a point,
+    their winding number, decides which way each connected patch faces, and which patches are sheets that enclose
+    nothing.
 
     Curves are flipped so that they bound a region together, the one with the shortest boundary where they leave gaps.
 

@@ -84,7 +84,8 @@ SHEET = 0.146
 """Level below which a piece bounds nothing: its squared distance from ½ is more than half of that of a flat sheet,
 (½ − 0.146)² = ½ · ¼. Flat and wavy sheets have 0, a seventh of a ball 0.16, half of one 0.31, all of it ½."""
 HINT = 0.25
-"""A piece was given as facing one way if the area that does so exceeds the rest by this share of the whole."""
+"""A piece was given as facing one way if the area that does so exceeds the rest by this share of the whole. Halved, it
+changes nothing; doubled, hidden bodies of which a fifth of the faces are flipped become cavities in 8 of 12 scenes."""
 OUTSIDE = 0.05
 """Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within if at most this
 share of its rims is outside. Half of the rims of the inside of a bowl or a vase lie outside its outside."""
