@@ -10,23 +10,24 @@ from .field_domain import FieldDomain
 
 
 def smooth_union(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:
-    """Unite two solids, with a round transition where they meet.
+    """Unite two solids, with a rounded seam where their surfaces meet.
 
     Where the two fields differ by less than the width w, φ is the polynomial smooth minimum
-    ``min(a, b) − (w − |a − b|)² / 4w``; elsewhere it is the smaller of the two. The concave edge where the solids meet
-    becomes a fillet of about that width.
+    ``min(a, b) − (w − |a − b|)² / 4w``. Elsewhere it is the smaller of the two. The concave edge where the surfaces
+    meet becomes a fillet of about that width.
 
     Parameters
     ----------
     a, b : Field
-        On the same domain.
+        Fields on the same domain, negative inside the solids.
     width : float
-        Width of the transition, in the units of the domain; 0 gives the smaller of the two everywhere.
+        Width of the rounded seam, in the units of the domain. With 0, φ is the smaller of the two everywhere.
 
     Returns
     -------
     Field
-        Its sign and zero set are those of the blend. `sharpen` makes it a distance.
+        Negative inside the union and zero on its surface. Elsewhere it is only about the distance; `sharpen` makes it
+        the distance.
 
     Raises
     ------
@@ -53,19 +54,30 @@ def smooth_union(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field
 
 
 def smooth_intersection(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:
-    """Intersect two solids, with a rounded edge where they meet; see `smooth_union`.
+    """Intersect two solids, with a rounded edge where their surfaces meet.
+
+    Where the two fields differ by less than the width w, φ is the polynomial smooth maximum
+    ``max(a, b) + (w − |a − b|)² / 4w``. Elsewhere it is the greater of the two.
 
     Parameters
     ----------
     a, b : Field
-        On the same domain.
+        Fields on the same domain, negative inside the solids.
     width : float
-        Width of the transition, in the units of the domain.
+        Width of the rounded edge, in the units of the domain. With 0, φ is the greater of the two everywhere.
 
     Returns
     -------
     Field
-        Its sign and zero set are those of the blend.
+        Negative inside the intersection and zero on its surface. Elsewhere it is only about the distance; `sharpen`
+        makes it the distance.
+
+    Raises
+    ------
+    GeometryError
+        If the fields lie on different domains.
+    SignedHeatError
+        If the width is negative or not finite.
 
     See Also
     --------
@@ -85,19 +97,29 @@ def smooth_intersection(a: Field[Domain], b: Field[FieldDomain], width: float) -
 
 
 def smooth_difference(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:
-    """Subtract the second solid from the first, with a rounded edge where they meet; see `smooth_union`.
+    """Subtract the second solid from the first, with a rounded edge where their surfaces meet.
+
+    The result is ``smooth_intersection(a, -b, width)``.
 
     Parameters
     ----------
     a, b : Field
-        On the same domain.
+        Fields on the same domain, negative inside the solids.
     width : float
-        Width of the transition, in the units of the domain.
+        Width of the rounded edge, in the units of the domain.
 
     Returns
     -------
     Field
-        Its sign and zero set are those of the blend.
+        Negative inside the difference and zero on its surface. Elsewhere it is only about the distance; `sharpen`
+        makes it the distance.
+
+    Raises
+    ------
+    GeometryError
+        If the fields lie on different domains.
+    SignedHeatError
+        If the width is negative or not finite.
 
     See Also
     --------

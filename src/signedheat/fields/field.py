@@ -48,32 +48,36 @@ else:
 
 Embedded = TypeVar("Embedded", bound=EmbeddedSurface)
 Rule: TypeAlias = Callable[[Floats, Floats], Floats]
+"""Takes the values of two fields, in arrays of the same shape, and returns the values of their combination."""
+
 Number: TypeAlias = float | np.number[Any]
 NUMBER_TYPES = (int, float, np.number)
 
 
 def finite(number: Number) -> float:
-    """Return a number as a float; refuse NaN and infinity, which would leave no distance."""
+    """Convert a number to a float; raise an error for NaN and infinity."""
     return finite_number(number, "number")
 
 
 @dataclass(frozen=True, eq=False)
 class Field(Displayed, Frozen, Generic[Domain]):
-    """Signed distance, or any other function, by its values on a domain.
+    """Signed distance, or any other scalar function φ, given by its values on a domain.
 
-    ``field(points)`` evaluates it anywhere, `contour` extracts level sets, and `save` writes it. ``-field``,
-    ``2 * field`` and ``field + 1`` are fields; so ``field - 0.1`` is the offset by 0.1. NumPy's functions treat a field
-    as the array of its values. ``a | b``, ``a & b``, ``a - b`` and ``~a`` combine solids that fields are negative in.
+    ``field(points)`` evaluates φ at any points, `contour` extracts level sets, and `save` writes a file. ``-field``,
+    ``2 * field`` and ``field + 1`` are fields, and ``field - 0.1`` is the field of the shape offset by 0.1. NumPy's
+    functions treat a field as the array of its values. ``a | b``, ``a & b``, ``a - b`` and ``~a`` are the union,
+    intersection, difference and complement of the solids in which the fields are negative.
 
-    A field that holds its solid is exact anywhere. It stays so when it is negated, multiplied, saved as ``.npz``, or
-    combined with another that holds its own; sums with numbers are interpolated. Combinations of fields without solids
-    have the right sign and zero set, but on one side of the boundary they are a bound of the distance; `sharpen` makes
-    them distance.
+    A field that holds its solid is exact at all points, not only on the domain. It stays exact when it is negated,
+    multiplied by a number, saved as ``.npz``, or combined with another field that holds its solid. After a number is
+    added, it is interpolated. Combinations of fields without solids have the right sign and zero set, but on one side
+    of the boundary their values are only a bound of the distance. `sharpen` turns them into distances.
 
     Parameters
     ----------
     domain : Grid, Band, TetMesh, TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, IntrinsicTriangulation
-        Where the values are. `piecewise_distance` returns fields on a `results.CutSurface`.
+        Grid, mesh or point cloud that carries the values. `piecewise_distance` returns fields on a
+        `results.CutSurface`.
     values : array
         φ, in the units of the domain: ``values[i, j, k]`` at ``grid.points[i, j, k]`` of a grid, (n_vertices,) on tets
         and surfaces, (n, 8, 8, 8) in the blocks of a band. Positive on the side that the normals of the source point
@@ -81,23 +85,23 @@ class Field(Displayed, Frozen, Generic[Domain]):
     diagnostics : Diagnostics
         Timings, diffusion time, and notes on the computation.
     confidence : array, optional
-        From 0 to 1, in the shape of the values: 1 where the nearest surface is given, less where it had to be
-        completed, the farther from any face.
+        Numbers from 0 to 1 in the shape of the values. They are 1 where the nearest surface point is given, and
+        smaller where it was completed, the farther it is from the given faces.
     solid : Solid, optional
-        What the values are distances to; calls, gradients and contours are then exact.
+        The solid that the values are distances to. With it, calls, gradients and contours are exact.
     source : SourceTerm, optional
-        What a solver computed the field from, for `sharpen`.
+        The source that a solver computed the field from; `sharpen` uses it.
     coarse : Field, optional
-        φ on the whole box, for points beyond a band; every field in a band has one.
+        φ on a coarse grid of the whole box, for points beyond a band. Every field in a band needs one.
     finer : Field, optional
-        φ on an intrinsic triangulation of a mesh, where it was computed: values at points and contours use it.
+        φ on the intrinsic triangulation of a mesh on which it was computed. Values at points and contours use it.
 
     Raises
     ------
     GeometryError
         If the values do not have the shape that the domain needs.
     UnsupportedTypeError
-        If fields have no values on such a domain.
+        If the domain is no grid, band, tet mesh, surface or point cloud.
 
     See Also
     --------
@@ -156,23 +160,23 @@ class Field(Displayed, Frozen, Generic[Domain]):
                 object.__setattr__(self, "confidence", confidence.astype(np.float32, copy=False))
 
     def __call__(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """φ at points: exact where the field has its solid, else that of `interpolate`.
+        """Evaluate φ at points, exactly if the field holds its solid, else by `interpolate`.
 
         Parameters
         ----------
         points : (..., d) float, Curve or SurfacePoints
-            Positions, in the units of the domain. Along surfaces, the closest points on the surface are taken, and
-            `Curve` and `SurfacePoints` are evaluated in the faces through which they are given.
+            Positions, in the units of the domain. For a field on a surface, positions are first projected to the
+            nearest point of the surface; a `Curve` or `SurfacePoints` is evaluated in the faces that it names.
 
         Returns
         -------
         (...) float
-            Signed distances, in the shape of the points: one number for one point.
+            Signed distances in the units of the domain, one for each point.
         """
         return self.interpolate(points) if self.solid is None else self.solid.distance(cast("ArrayLike", points))
 
     def interpolate(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """Interpolate the values of the field at points; call the field for exact distance where it holds a solid.
+        """Interpolate the values of the field at points, without its solid. ``field(points)`` uses the solid.
 
         Between the nodes of a grid, φ is linear along each axis. Beyond a band, which has fine nodes near the surface
         only, the nodes of a coarse grid are used. In triangles φ is linear. In tets it is quadratic, from values and
@@ -182,13 +186,14 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Parameters
         ----------
         points : (..., d) float, Curve or SurfacePoints
-            Positions with d coordinates, in the units of the domain. On surfaces, φ is taken at the nearest point of
-            the surface, or in the faces in which a `Curve` or `SurfacePoints` is given.
+            Positions with d coordinates, in the units of the domain. For a field on a surface, positions are first
+            projected to the nearest point of the surface; a `Curve` or `SurfacePoints` is evaluated in the faces that
+            it names.
 
         Returns
         -------
         (...) float
-            Signed distances in the units of the domain, negative inside; NaN where no value is near.
+            Signed distances in the units of the domain, negative inside, and NaN where the values around a point are.
 
         Raises
         ------
@@ -209,21 +214,21 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.finest._interpolant(points)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """Compute the direction in which φ grows: exactly where the field holds a solid, else from its values.
+        """Compute the gradient ∇φ at points, exactly if the field holds its solid, else from its values.
 
-        On grids these are central differences, interpolated, on tets volume-weighted means at the vertices,
-        interpolated, and on surfaces the gradient in the triangle. Outside a grid or tets, it is the gradient at the
-        nearest point of the domain.
+        On grids, central differences at the nodes are interpolated. On tets, volume-weighted means at the vertices are
+        interpolated. On surfaces it is the constant gradient in the triangle. Outside a grid or tets, it is the
+        gradient at the nearest point of the domain.
 
         Parameters
         ----------
         points : (..., d) float, Curve or SurfacePoints
-            Positions with d coordinates, in the units of the domain, or on a surface, as for `interpolate`.
+            Positions with d coordinates in the units of the domain, or points on a surface, as for `interpolate`.
 
         Returns
         -------
         (..., d) float
-            Gradients ∇φ in space, without units. They have length about 1, since φ is a distance.
+            Vectors ∇φ, without units. They point to where φ grows, and have length about 1 if φ is a distance.
 
         Raises
         ------
@@ -247,9 +252,9 @@ class Field(Displayed, Frozen, Generic[Domain]):
 
     @property
     def cell_gradients(self) -> Floats:
-        """(m, 3) ∇φ in each triangle or tet, where φ is linear; zero in degenerate triangles.
+        """Gradient ∇φ of each of m triangles or tets, (m, 3) float, with φ linear in it; zero in degenerate triangles.
 
-        Where φ was computed on finer triangles, `gradient` is more accurate.
+        Where φ was computed on finer triangles, `gradient` is more accurate. Fields on grids have no such cells.
         """
         gradients = getattr(self.restrict()._interpolant, "cell_gradients", None)
         if gradients is None:
@@ -261,22 +266,22 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.domain._interpolant(self.values, None if self.coarse is None else self.coarse.interpolate)
 
     def closest(self, points: ArrayLike) -> Closest:
-        """Find the nearest point of the solid's surface for points in space: `Solid.closest`.
+        """Find the nearest points on the surface of the solid that the field holds, as `Solid.closest` does.
 
         Parameters
         ----------
         points : (..., 3) float
-            Positions, in the units of the domain; they may lie outside of it.
+            Positions in the units of the domain, inside or outside of it.
 
         Returns
         -------
         Closest
-            Distances, positions, faces and where in them, gradients, confidence.
+            Signed distances, nearest points with their faces and barycentric weights, gradients, and confidence.
 
         Raises
         ------
         SourceError
-            If the field has no solid: it was computed otherwise, or read from a file without one.
+            If the field holds no solid, because a solver computed it or a file without a solid held it.
 
         See Also
         --------
@@ -299,7 +304,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.solid.closest(points)
 
     def confidence_at(self, points: ArrayLike) -> NDArray[np.float32]:
-        """Return the confidence at points: 1 where the nearest surface is given, less where it had to be completed.
+        """Return the confidence at points, which is 1 where the nearest surface point is given, not completed.
 
         Parameters
         ----------
@@ -309,7 +314,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Returns
         -------
         (...) float
-            From 0 to 1. Outside the domain it is that of the nearest point of it; it is 1 if the field has none.
+            Numbers from 0 to 1. A field that holds its solid asks the solid. Otherwise values are interpolated, outside
+            the domain at its nearest point, and all are 1 if the field has no confidence.
 
         See Also
         --------
@@ -324,16 +330,19 @@ class Field(Displayed, Frozen, Generic[Domain]):
         """
         if self.solid is not None:
             return self.solid.closest(points).confidence
-        inside = self.domain._clipped(points)
+        clipped = self.domain._clipped(points)
         if self.confidence is None:
-            return np.ones(np.shape(self._interpolant(inside)), dtype=np.float32)[()]
+            return np.ones(np.shape(self._interpolant(clipped)), dtype=np.float32)[()]
         beyond: Any = None if self.coarse is None else self.coarse.confidence_at
-        found = self.domain._interpolant(self.confidence.astype(np.float32), beyond)(inside)
-        return np.clip(found, 0, 1).astype(np.float32)
+        confidence = self.domain._interpolant(self.confidence.astype(np.float32), beyond)(clipped)
+        return np.clip(confidence, 0, 1).astype(np.float32)
 
     @property
     def finest(self) -> Field[FieldDomain]:
-        """The field where φ was computed: `finer`, if its values are still the same, or the field itself."""
+        """The field on the domain on which φ was computed.
+
+        This is `finer` if there is one with the same values at the vertices of this field, otherwise the field itself.
+        """
         finer = self.finer
         if finer is None or not np.array_equal(finer.values[: len(self.values)], self.values, equal_nan=True):
             return self
@@ -346,12 +355,12 @@ class Field(Displayed, Frozen, Generic[Domain]):
     @overload
     def restrict(self) -> Field[FieldDomain]: ...
     def restrict(self) -> Field[FieldDomain]:
-        """Restrict φ to a plainer domain: from a band to the coarse grid, from an intrinsic triangulation to its mesh.
+        """Restrict φ to a plainer domain: a band to its coarse grid, or an intrinsic triangulation to its mesh.
 
         Returns
         -------
         Field
-            This field itself on any other domain.
+            φ on the coarse grid or on the mesh. A field on any other domain returns itself.
 
         See Also
         --------
@@ -374,17 +383,17 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return Field(domain, self.values[: domain._values_shape[0]], self.diagnostics, source=self.source)
 
     def expand(self) -> Field[FieldDomain]:
-        """Convert to a field on a plain grid or mesh that keeps all detail, to draw, save or measure.
+        """Convert to a field on a plain grid or mesh that keeps all detail, to draw, save or measure it.
 
-        A band of nodes near the surface becomes its whole grid; other nodes are interpolated from the coarse field. An
-        intrinsic triangulation, whose edges cross faces of its mesh, becomes the flat polygons into which both cut one
-        another (`common_subdivision`); so it does where `finer` holds it. On the cut surface of `piecewise_distance`,
-        the vertices along the cut are doubled, so that φ can jump.
+        A band of nodes near the surface becomes its whole grid, with values from the coarse field at the other nodes.
+        An intrinsic triangulation, also that of `finer`, has edges that cross faces of its mesh. It becomes a mesh of
+        flat polygons, its `common_subdivision` with the mesh. On the cut surface of `piecewise_distance`, the vertices
+        along the cut are doubled, so that φ can jump.
 
         Returns
         -------
         Field
-            With values in the same units; on any other domain, this field itself.
+            φ on that grid or mesh, in the same units. A field on any other domain returns itself.
 
         See Also
         --------
@@ -406,12 +415,12 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self if domain is self.domain else Field(domain, values, self.diagnostics, solid=self.solid)
 
     def plain(self) -> Field[FieldDomain]:
-        """Return the field on a domain that files and viewers know, such as the faces of voxels, or a full grid.
+        """Convert to a field on a domain that files and viewers support, such as the faces of voxels or a full grid.
 
         Returns
         -------
         Field
-            This field itself if files and viewers know its domain already.
+            The converted field, or this field itself if its domain is supported already.
 
         See Also
         --------
@@ -441,22 +450,22 @@ class Field(Displayed, Frozen, Generic[Domain]):
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline] | list[Curve]:
         """Extract the level set φ = level.
 
-        In space, a surface: closed, manifold, with normals pointing to greater φ. Where it leaves the domain, as the
-        completion of an open shape may do, it is closed along the box of the grid (1 % of a cell outside) or the
-        boundary of the tets; where it meets nodes without a value, along the last nodes before them.
+        In space, the level set is a closed manifold mesh whose normals point to greater φ. Where it would leave the
+        domain, as the completion of an open shape may do, it is closed along the box of the grid (1 % of a cell
+        outside) or the boundary of the tets. Where values are NaN, it is closed along the last nodes with a value.
 
-        In the plane and on surfaces, lines, one for each connected component, open or closed, with greater φ to their
-        left. Open ones end where the domain ends, at nodes without a value, and at cuts.
+        In the plane and on surfaces, the level set is one open or closed line for each connected component, with
+        greater φ to its left. Open lines end where the domain ends, where values are NaN, and at cuts.
 
         Parameters
         ----------
         level : float
-            The level, in the units of the domain.
+            The value of φ on the level set, in the units of the domain.
 
         Returns
         -------
         TriangleMesh, list of Polyline or list of Curve
-            The surface in space, the polylines in the plane, or the curves on a surface.
+            A mesh in space, polylines in the plane, or curves on a surface.
 
         Raises
         ------
@@ -482,8 +491,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
         """
         level, fine = finite_number(level, "level"), self.finest
         exact = None if self.solid is None else self.solid.distance
-        found: TriangleMesh | list[Polyline] | list[Curve] = fine.domain._level_set(fine.values, level, exact)
-        return found
+        contour: TriangleMesh | list[Polyline] | list[Curve] = fine.domain._level_set(fine.values, level, exact)
+        return contour
 
     @overload
     def offset(self: Field[Grid[Literal[3]]] | Field[TetMesh], distance: float) -> TriangleMesh: ...
@@ -496,7 +505,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
     @overload
     def offset(self, distance: float) -> TriangleMesh | list[Polyline] | list[Curve]: ...
     def offset(self, distance: float) -> TriangleMesh | list[Polyline] | list[Curve]:
-        """Offset the shape by a signed distance, and refuse that if a grid or tets are too small for it.
+        """Offset the shape by a signed distance; raise an error if the grid or tets are too small for the result.
 
         Parameters
         ----------
@@ -506,12 +515,13 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Returns
         -------
         TriangleMesh, list of Polyline or list of Curve
-            With the edges and corners of the offset if the field holds its solid and is no band; else as `contour`.
+            The level set φ = distance. If the field holds its solid and is not in a band, sharp edges and corners of
+            the offset are kept. Otherwise it is the result of `contour`.
 
         Raises
         ------
         OutsideError
-            If φ does not take the value, or the offset leaves the grid or the tets although the shape itself does not.
+            If φ takes the distance nowhere, or if the offset leaves the grid or the tets and the shape does not.
 
         See Also
         --------
@@ -534,26 +544,29 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.contour(distance)
 
     def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
-        """Write the level set φ = level in space to a file; that of a band part by part, so that it may exceed memory.
+        """Write the level set φ = level in space to a file.
+
+        The level set of a field in a band is computed and written part by part, so that it may be larger than memory.
 
         Parameters
         ----------
         path : str or path
-            A ``.ply`` file. An existing one survives a failure.
+            A ``.ply`` file. An existing file is replaced only after the new one is complete.
         level : float
-            See `contour`. In bands, creases are left as the cells cut them.
+            The value of φ on the level set, in the units of the domain. In bands, sharp creases are chamfered by the
+            cells.
 
         Returns
         -------
         vertices, faces : int
-            How many were written.
+            Number of vertices and faces in the file.
 
         Raises
         ------
         OutsideError, GeometryError
-            As `contour`; also if the level set is made of lines.
+            As `contour`, and if the level set consists of lines.
         FileFormatError
-            If the file is of another kind, or cannot be written.
+            If the file name does not end in ``.ply``, or the file cannot be written.
 
         See Also
         --------
@@ -574,14 +587,14 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return cast("tuple[int, int]", ply.write_parts(parts, path))
 
     def to_pyvista(self) -> pyvista.DataSet:
-        """Convert to PyVista.
+        """Convert the domain and its values to a PyVista data set.
 
         Returns
         -------
         pyvista.DataSet
-            `pyvista.ImageData` of a grid, with z = 0 in the plane, and of a band that of the coarse field,
-            `pyvista.UnstructuredGrid` of tets, `pyvista.PolyData` of a surface, cut open where φ jumps. The values are
-            point data ``signed_distance``; ``confidence`` is there, too, where the field has it.
+            `pyvista.ImageData` for a grid (with z = 0 in the plane), and for a band the one of its coarse field;
+            `pyvista.UnstructuredGrid` for tets; `pyvista.PolyData` for a surface, cut open where φ jumps. The point
+            data ``signed_distance`` holds φ. If the field has a confidence, the point data ``confidence`` holds it.
 
         Raises
         ------
@@ -606,16 +619,16 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return drawn
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension; `signedheat.read_field` reads most of them.
+        """Write the field to a file in the format given by its extension.
 
         Parameters
         ----------
         path : str or path
-            On grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``. In a band ``.npz``, ``.vdb`` or, with
-            all nodes of the grid, ``.vti``. On tets ``.vtu``, ``.vtk`` or ``.msh``. On surfaces ``.ply`` or ``.vtp``
-            with a property ``signed_distance`` per vertex, ``.obj`` with a texture coordinate, or ``.npz``. Not read
-            are ``.vdb`` and ``.obj``. The file is written under a temporary name and renamed, so that an existing one
-            survives a failure.
+            For grids ``.npz``, ``.vti``, ``.nrrd``, ``.npy`` or ``.vdb``. For bands ``.npz``, ``.vdb`` or, with
+            all nodes of the grid, ``.vti``. For tets ``.vtu``, ``.vtk`` or ``.msh``. For surfaces ``.ply`` or ``.vtp``
+            with a property ``signed_distance`` per vertex, ``.obj`` with φ as a texture coordinate, or ``.npz``.
+            `read_field` reads all of these but ``.vdb`` and ``.obj``. An existing file is replaced only after the new
+            one is complete.
 
         Raises
         ------
@@ -642,17 +655,17 @@ class Field(Displayed, Frozen, Generic[Domain]):
         files.write_field(self, path)
 
     def with_values(self, values: ArrayLike) -> Field[Domain]:
-        """Return a field of other values on the same domain.
+        """Return a field with new values on the same domain.
 
         Parameters
         ----------
         values : array
-            As many as this field has, in the same shape.
+            The new values, in the shape of ``field.values``.
 
         Returns
         -------
         Field
-            Without diagnostics, source, confidence and solid.
+            The new field. It has no diagnostics, source, confidence or solid.
 
         See Also
         --------
@@ -668,26 +681,27 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return Field(self.domain, cast("NDArray[Any]", values))
 
     def combined_with(self, other: Field[FieldDomain], rule: Rule) -> Field[Domain]:
-        """Combine the values of two fields on one domain by a rule.
+        """Combine the values of two fields on the same domain by a function of two arrays.
 
         Parameters
         ----------
         other : Field
-            On the same domain.
+            A field on the same domain.
         rule : callable
-            Takes two arrays of values and returns one, such as `np.minimum`.
+            Takes the values of this field and those of the other, and returns an array of the same shape. An example
+            is `np.minimum`.
 
         Returns
         -------
         Field
-            With the values that the rule returns.
+            The field of the values that the rule returns, without diagnostics, source, confidence and solid.
 
         Raises
         ------
         GeometryError
-            If the fields lie on different domains.
+            If the fields lie on different domains of the same type.
         UnsupportedTypeError
-            If these are of different kinds.
+            If their domains have different types.
 
         See Also
         --------
@@ -706,16 +720,16 @@ class Field(Displayed, Frozen, Generic[Domain]):
         if self.coarse is not None and other.coarse is not None:
             coarse = self.coarse.combined_with(other.coarse, rule)
             return Field(domain, np.asarray(values, dtype=self.values.dtype), coarse=coarse)
-        fine = [each.finer.domain for each in (self, other) if each.finer is not None and each.finest is each.finer]
-        if not fine:
+        triangulations = [f.finer.domain for f in (self, other) if f.finer is not None and f.finest is f.finer]
+        if not triangulations:
             return Field(domain, values)
-        finest = max(fine, key=lambda triangulation: triangulation.n_vertices)
-        there = rule(self._at_vertices_of(finest), other._at_vertices_of(finest))
-        there[: len(values)] = values
-        return Field(domain, values, finer=Field(finest, there))
+        finest = max(triangulations, key=lambda triangulation: triangulation.n_vertices)
+        fine_values = rule(self._at_vertices_of(finest), other._at_vertices_of(finest))
+        fine_values[: len(values)] = values
+        return Field(domain, values, finer=Field(finest, fine_values))
 
     def _at_vertices_of(self, triangulation: IntrinsicTriangulation) -> Floats:
-        """φ at the vertices of an intrinsic triangulation of the mesh; NaN at vertices without a face."""
+        """Return (n_vertices,) φ at the vertices of an intrinsic triangulation, NaN at vertices without a face."""
         if self.finest.domain is triangulation:
             return self.finest.values
         faces, weights = triangulation.vertex_places
@@ -725,11 +739,11 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return values
 
     def _mapped(self, change: Callable[[NDArray[Any]], NDArray[Any]]) -> Field[Domain]:
-        """Return a field of changed values, without the diagnostics."""
+        """Return the field of ``change(values)``, without diagnostics, source, confidence and solid."""
         return self.combined_with(self, lambda phi, _: change(phi))
 
     def _scaled(self, factor: float) -> Field[Domain]:
-        """Return the field times a number; it is exact if this one is and the number is neither 0 nor infinite."""
+        """Return the field times a number, with the scaled solid if there is one and the number is finite and not 0."""
         exact = self.solid is not None and factor != 0 and math.isfinite(factor)
         result = self._mapped(lambda phi: phi * factor)
         coarse = None if self.coarse is None else self.coarse._scaled(factor)
@@ -774,33 +788,37 @@ class Field(Displayed, Frozen, Generic[Domain]):
     __rmul__ = __mul__
 
     def __or__(self, other: Field[FieldDomain] | MakesFields) -> Field[Domain]:
-        """Union: inside where at least one of the two fields is."""
+        """Return the union of two solids, which is negative where at least one of the two fields is."""
         return self._of_solids(other, operator.or_) or combined(self, other, np.less_equal, 0.0)
 
     def __and__(self, other: Field[FieldDomain] | MakesFields) -> Field[Domain]:
-        """Intersection: inside where both fields are."""
+        """Return the intersection of two solids, which is negative where both fields are."""
         return self._of_solids(other, operator.and_) or combined(self, other, np.greater_equal, 0.0)
 
     def __sub__(self, other: Field[FieldDomain] | MakesFields | Number) -> Field[Domain]:
-        """Difference: inside where this field is and the other is not; a number is subtracted from the values."""
+        """Return the difference of two solids, negative where only this field is; subtract a number from the values."""
         if isinstance(other, NUMBER_TYPES):
             return self + -finite(other)
         exact = self._of_solids(other, operator.sub)
         return exact or combined(self, checked(self, other)._mapped(np.negative), np.greater_equal, 0.0)
 
     def __invert__(self) -> Field[Domain]:
-        """Complement: inside and outside exchanged."""
+        """Return the complement of the solid, with inside and outside exchanged."""
         return self._scaled(-1.0)
 
     def _of_solids(self, other: object, operation: Callable[[Any, Any], Any]) -> Field[Domain] | None:
-        """Compute the field of two fields' combined solids; None if one has none, or nothing is inside the result."""
-        theirs = other if isinstance(other, MakesFields) else getattr(other, "solid", None)
-        if not isinstance(self.solid, MakesFields) or not isinstance(theirs, MakesFields):
+        """Combine the solids that two fields hold, and compute the field of the result on this domain.
+
+        `operation` combines two solids, as `operator.or_` does. Returns None if one of the fields holds no solid, or
+        nothing is inside the result.
+        """
+        other_solid = other if isinstance(other, MakesFields) else getattr(other, "solid", None)
+        if not isinstance(self.solid, MakesFields) or not isinstance(other_solid, MakesFields):
             return None
         if not isinstance(other, MakesFields):
             checked(self, other)
         try:
-            solid = operation(self.solid, theirs)
+            solid = operation(self.solid, other_solid)
         except SourceError:
             return None
         return cast("Field[Domain]", solid.field_on(self))
@@ -812,7 +830,11 @@ class Field(Displayed, Frozen, Generic[Domain]):
 
 
 def refuse_beyond_walls(walls: NDArray[Any], distance: float) -> None:
-    """Raise `OutsideError` if values at a domain's walls show that a level set leaves it, but the shape does not."""
+    """Raise `OutsideError` if the level set φ = distance leaves a domain that the zero set does not leave.
+
+    `walls` has the values on the walls of the domain, and is empty for domains without walls. The zero set does not
+    leave the domain if they all have the same sign.
+    """
     if not walls.size:
         return
     low, high = float(np.fmin.reduce(walls)), float(np.fmax.reduce(walls))
@@ -831,27 +853,35 @@ def combined(
     takes_first: Callable[[Floats, Floats], Bools],
     bulge: float,
 ) -> Field[Domain]:
-    """Take `a` where `takes_first(a, b)`, else `b`; a blend of width |bulge| raises φ, or lowers it if `bulge` < 0."""
+    """Return the field with the values of `a` where ``takes_first(a, b)``, else of `b`, and a rounded seam between.
 
-    def rule(one: Floats, other: Floats) -> Floats:
-        values = np.where(takes_first(one, other), one, other)
+    Where the two differ by less than w = |bulge|, (w − |a − b|)² / 4w is added, or subtracted if `bulge` is negative.
+    Values are NaN where one of the two is.
+    """
+
+    def rule(first: Floats, second: Floats) -> Floats:
+        values = np.where(takes_first(first, second), first, second)
         if bulge:
-            near = np.maximum(abs(bulge) - np.abs(one - other), 0.0)
-            values = values + near**2 / (4 * bulge)
-        values[np.isnan(one) | np.isnan(other)] = np.nan
+            overlap = np.maximum(abs(bulge) - np.abs(first - second), 0.0)
+            values = values + overlap**2 / (4 * bulge)
+        values[np.isnan(first) | np.isnan(second)] = np.nan
         return values
 
     return a.combined_with(checked(a, b), rule)
 
 
 def checked(a: object, b: object) -> Field[FieldDomain]:
-    """Return the second field, computed on the domain of the first if it is a solid; refuse what does not fit."""
+    """Return the second operand `b` as a field on the domain of the field `a`.
+
+    A solid becomes its field on that domain. Anything but a field or a solid, and a field on another domain, raises an
+    error.
+    """
     if isinstance(a, Field) and isinstance(b, MakesFields):
         b = b.field_on(a)
     if not isinstance(a, Field) or not isinstance(b, Field):
-        other = type(a if isinstance(b, Field) else b).__name__
+        name = type(a if isinstance(b, Field) else b).__name__
         raise UnsupportedTypeError(
-            f"a field is not combined with a {other}", remedy="pass a field on the same domain", element=other
+            f"a field is not combined with a {name}", remedy="pass a field on the same domain", element=name
         )
     a.domain._shared(b.domain)
     return b

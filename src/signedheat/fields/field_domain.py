@@ -1,4 +1,4 @@
-"""What a field asks of its domain: how values lie on it, what is between them, and where they take a level."""
+"""Interface that a `Field` needs of its domain: shape of the values, interpolation and level sets."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 Exact: TypeAlias = Callable[[ArrayLike], Floats]
-"""Distance at any points of space."""
+"""Function that takes (..., d) points of space and returns (...) signed distances."""
 
 
 class Interpolant(Protocol):
-    """A function that has a field's values, and its gradient, at any points of the domain."""
+    """A field's function on the whole domain: a call returns its values at points, `gradient` its gradients."""
 
     def __call__(self, points: Any) -> Floats: ...
     def gradient(self, points: Any) -> Floats: ...
@@ -31,11 +31,11 @@ class FieldDomain:
 
     @property
     def _values_shape(self) -> tuple[int, ...]:
-        """Shape of the values of a field."""
+        """Shape that the array of a field's values has on this domain, such as (n_vertices,)."""
         raise NotImplementedError
 
     def _checked(self, values: object) -> NDArray[Any]:
-        """Return the values of a field as an array; refuse any other shape."""
+        """Return the values of a field as a contiguous array; raise an error if it is not of `_values_shape`."""
         array = contiguous(values, "values")
         if array.shape != self._values_shape:
             raise GeometryError(
@@ -44,19 +44,19 @@ class FieldDomain:
         return array
 
     def _interpolant(self, values: NDArray[Any], beyond: Exact | None) -> Interpolant:
-        """Interpolate values; `beyond` has those at points of space where the domain has none."""
+        """Return the function that interpolates values; `beyond`, if any, evaluates it at points off the domain."""
         raise NotImplementedError
 
     def _clipped(self, points: ArrayLike) -> Any:
-        """Return the nearest points of the domain."""
+        """Return the point of the domain nearest to each of (..., d) points; unchanged unless a domain overrides it."""
         return points
 
     def _level_set(self, values: NDArray[Any], level: float, exact: Exact | None) -> Any:
-        """Extract a level set, moved onto that of the exact distance, if there is one."""
+        """Extract the level set φ = level of values; its vertices are moved onto that of `exact`, if that is given."""
         raise NotImplementedError
 
     def _level_parts(self, values: NDArray[Any], level: float, exact: Exact | None) -> Iterator[tuple[Floats, Ints]]:
-        """Yield vertices and faces of a level set in space, part by part."""
+        """Yield (n, 3) vertices and (m, 3) faces of a level set in space, part by part."""
         surface = self._level_set(values, level, exact)
         if isinstance(surface, list):
             raise GeometryError(
@@ -65,27 +65,30 @@ class FieldDomain:
         yield surface.vertices, surface.faces
 
     def _values_at_walls(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return the values where level sets leave the domain."""
+        """Return the values at the walls of the domain, through which level sets leave it; none without walls."""
         return np.empty(0)
 
     def _restricted(self) -> FieldDomain:
-        """Return the domain in space whose unknowns are the first ones of this one."""
+        """Return the plainer domain, such as the mesh of a triangulation, whose values are the first of the values."""
         return self
 
     def _expanded(self, values: NDArray[Any], beyond: Exact | None) -> tuple[FieldDomain, NDArray[Any]]:
-        """Return the same function on a domain in space that has all its detail."""
+        """Return a plain grid or mesh that has all detail of this domain, and the values of the same function on it."""
         return self, values
 
     def _plain(self, values: NDArray[Any]) -> tuple[FieldDomain, NDArray[Any]]:
-        """Return the function on a domain that files and viewers support."""
+        """Return a domain that files and viewers support, and the values of the same function on it."""
         return self, values
 
     def _stretched(self, factor: float) -> Self:
-        """Return the domain of values that are multiplied by a number."""
+        """Return the domain for values multiplied by a factor; it differs only if the domain depends on the values."""
         return self
 
     def _shared(self, other: FieldDomain) -> Self:
-        """Return the domain of combinations of fields on this and on another; refuse one with other unknowns."""
+        """Return the domain for a combination of a field on this domain with one on another.
+
+        Raises an error if the two differ in type, points, vertices or cells.
+        """
         if self is other:
             return self
         if type(self) is not type(other):
@@ -100,10 +103,10 @@ class FieldDomain:
         return self
 
 
-def different(one: object, other: object) -> GeometryError:
-    """Return the error for fields on domains with different unknowns."""
+def different(first: object, second: object) -> GeometryError:
+    """Return the error that says that two fields lie on different domains."""
     return GeometryError(
-        f"the fields lie on different domains: {one!r} and {other!r}",
+        f"the fields lie on different domains: {first!r} and {second!r}",
         remedy="compute both on one, such as a Grid.around the bounds of both",
         element="second field",
     )

@@ -1,4 +1,4 @@
-"""Queries of a solid at points: what a field needs of the solid whose distance it holds."""
+"""Interface that a `Field` needs of the solid whose distance it holds."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Closest:
     gradients : (..., 3) float
         Gradients of the distance, of length 1; on the surface, its normals.
     confidence : (...) float
-        1 on the given surface; on the completion less, the farther from its boundary.
+        1 on the given surface. On the completion it is less, the farther from the given surface.
 
     See Also
     --------
@@ -52,7 +52,7 @@ class Closest:
 
     @property
     def completed(self) -> Bools:
-        """(...) whether the place lies on the completion."""
+        """Whether each nearest point lies on the completion instead of the given shape, (...) bool."""
         return self.faces < 0
 
     def __repr__(self) -> str:
@@ -66,49 +66,49 @@ class SolidQueries(Protocol):
     def triangles(self) -> Floats: ...  # (m, 3, 3) corners of the triangles that distance is measured to
     def distance(self, points: ArrayLike) -> Floats: ...  # (...) signed distances of (..., d) points
     def inside(self, points: ArrayLike) -> Bools: ...  # (...) whether points are inside
-    def closest(self, points: ArrayLike) -> Closest: ...  # the nearest place for each of (..., d) points
+    def closest(self, points: ArrayLike) -> Closest: ...  # the nearest surface points of (..., d) points
 
 
 @runtime_checkable
 class MakesFields(Protocol):
-    """An object whose distance can be computed where a field has values, such as a `Solid`."""
+    """An object, such as a `Solid`, whose signed distance can be computed on the domain of a given field."""
 
     def field_on(self, field: Any) -> Any:
-        """Compute distance on the domain of a field."""
+        """Compute the field of the signed distance to this object on the domain of a field."""
 
     def _surface_on(self, field: Any, level: float) -> Any:
-        """Extract the surface at a level of its field, with edges and corners, in the cells of the field's grid."""
+        """Extract the level set at a level, with sharp edges and corners, in the cells of the field's grid."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scaled:
-    """The distance to a solid times a number."""
+    """Queries of a solid with all distances multiplied by a factor."""
 
     solid: SolidQueries
     factor: float  # not 0; a negative factor exchanges inside and outside
 
     @property
     def triangles(self) -> Floats:
-        """(m, 3, 3) corners of the triangles that distance is measured to."""
+        """Corners of the m triangles that distance is measured to, (m, 3, 3) float."""
         return self.solid.triangles
 
     def distance(self, points: ArrayLike) -> Floats:
-        """Return (...) values at (..., d) points."""
+        """Return the (...) scaled signed distances of (..., d) points."""
         return self.factor * self.solid.distance(points)
 
     def inside(self, points: ArrayLike) -> Bools:
-        """Return (...) whether the values are negative at points."""
+        """Return (...) bool, true where the scaled signed distance of (..., d) points is negative."""
         inside = self.solid.inside(points)
         return inside if self.factor > 0 else ~inside
 
     def closest(self, points: ArrayLike) -> Closest:
-        """Find the nearest place for each of (..., d) points, with the values and their gradients."""
+        """Find the nearest surface points of (..., d) points, with scaled distances and gradients."""
         closest = self.solid.closest(points)
         return replace(closest, distances=self.factor * closest.distances, gradients=self.factor * closest.gradients)
 
 
 def scaled(solid: SolidQueries, factor: float) -> SolidQueries:
-    """Multiply the distance to a solid by a number; return the solid itself if that is 1."""
+    """Multiply the distances that a solid returns by a factor, which is not 0; return the solid itself if it is 1."""
     if isinstance(solid, Scaled):
         return scaled(solid.solid, solid.factor * factor)
     return solid if factor == 1 else Scaled(solid, factor)

@@ -28,13 +28,17 @@ from ..tets.tet_source import TetSource
 from .field import Domain, Field
 
 SMALL_LOOP = 3.5
-"""Length of a loop, in side lengths of the triangles that it crosses, below which at least a quarter of its heat
-cancels."""
+"""Length of a closed curve, in mean sides of the triangles it crosses, below which it counts as small. At least a
+quarter of the heat of a small loop cancels, so φ is inaccurate and a note says so."""
 
 
 @singledispatch
 def to_field(discretization: Any, values: Floats, source: Any, diagnostics: Diagnostics) -> Field[Any]:
-    """Make a field of the values at a discretisation's unknowns, and add the discretisation's notes to diagnostics."""
+    """Make a field of the values at the unknowns of a discretisation of any domain.
+
+    `values` has one value for each unknown, and NaN where no source is connected. The notes of the discretisation and
+    of the source are added to the diagnostics.
+    """
     raise UnsupportedTypeError(f"there is no field for {type(discretization).__name__}", element="domain")
 
 
@@ -74,9 +78,9 @@ def _(
 
 
 def _named(domain: object, vertex: int) -> str:
-    """Name a vertex by its place, which does not depend on the numbering of vertices, or without one by its number."""
-    places = getattr(domain, "vertices", getattr(domain, "points", None))
-    return f"number {vertex}" if places is None else f"at ({', '.join(f'{x:.4g}' for x in places[vertex])})"
+    """Name a vertex for a message by its coordinates, or by its number if the domain has no coordinates."""
+    positions = getattr(domain, "vertices", getattr(domain, "points", None))
+    return f"number {vertex}" if positions is None else f"at ({', '.join(f'{x:.4g}' for x in positions[vertex])})"
 
 
 @to_field.register
@@ -95,12 +99,12 @@ def _(discretization: TetDiscretization, values: Floats, source: TetSource, diag
 
 
 def sampled(source: GridSource) -> SampledSource:
-    """Return the note on how many samples a source was merged into on a grid, and on the area that was lost."""
+    """Return the note on the number of samples of a source on a grid, the area outside it and the cancelled area."""
     return SampledSource(len(source.weights), source.samples.outside, source.samples.cancelled)
 
 
 def warned(field: Field[Domain]) -> Field[Domain]:
-    """Return the field, and warn if it was computed from curves that are too small for its triangles."""
+    """Return the field, after an `InexactWarning` if its diagnostics have a note on curves too small for triangles."""
     note = field.diagnostics.note(SmallLoops)
     if note:
         warn_user(
@@ -112,7 +116,10 @@ def warned(field: Field[Domain]) -> Field[Domain]:
 
 
 def small_loops(source: SurfaceSource) -> int:
-    """Count closed oriented curves shorter than `SMALL_LOOP` sides of triangles, for which φ is inaccurate."""
+    """Count closed oriented curves shorter than `SMALL_LOOP` mean sides of the triangles they cross.
+
+    Segments along edges of the mesh count as resolved, with sides of length 0.
+    """
     parts = [part for part in source.parts if part.oriented and len(part.ends)]
     if not parts:
         return 0
@@ -130,7 +137,11 @@ def small_loops(source: SurfaceSource) -> int:
 
 
 def spread(points: Floats, values: Floats, used: Bools) -> Floats:
-    """Continue (n,) signed distances to `used` points where they are NaN, by shortest paths between neighbours."""
+    """Replace NaN in (n,) signed distances at `used` points by lengths of shortest paths from points with a value.
+
+    Paths run in the graph of nearest neighbours of the (n, 3) points. The sign is that of the point where a path
+    starts. Points that no path reaches stay NaN.
+    """
     lacking = np.isnan(values) & used
     ids = np.flatnonzero(used)
     if not lacking.any() or len(ids) <= POINT_NEIGHBORS:
