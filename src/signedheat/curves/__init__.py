@@ -1,1 +1,1 @@
-"""Curves on surfaces as they are drawn: which side is which, what closes them, and the distance to them."""
+"""Broken curves on surfaces and drawings in the plane: their orientation, their completion and the distance to them."""

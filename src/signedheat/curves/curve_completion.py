@@ -32,8 +32,8 @@ from .resolution import flattened, on_resolving_triangles
 from .stroke_directions import pieces_for_all
 
 LEAST_LOOP = 0.5
-"""Loops that are shorter than this, or farther from the curves, relative to the shortest curve, complete nothing: φ has
-the wrong sign inside them."""
+"""Least length of a loop of the zero set, and its greatest distance from the curves, both relative to the shortest
+curve. Loops that are shorter or farther away are left out, since they complete nothing: φ has the wrong sign inside."""
 
 
 @public_call
@@ -46,40 +46,40 @@ def close_curves(
     as_oriented: bool = False,
     every_piece: bool = False,
 ) -> list[Curve]:
-    """Complete broken curves: the zero set of the signed distance to them, which has no gaps.
+    """Close the gaps of broken curves by the zero set of the signed distance to them.
 
-    On triangle meshes the method runs on an intrinsic triangulation along whose edges the curves run, so that curves
-    may be smaller than the triangles, and the result follows them where they are there. The mesh is
-    repaired and curves are flipped and left out as by `signed_distance`.
+    On triangle meshes the method runs on an intrinsic triangulation whose edges follow the curves. So curves may be
+    smaller than the triangles, and the result coincides with them except at gaps. The mesh is repaired, and curves are
+    flipped and left out, as by `signed_distance`.
 
     Parameters
     ----------
     curves : Curve or a sequence of them
-        Oriented curves, open or closed, noisy, overlapping, crossing; or lists of (element, coordinates), as for
-        `signed_distance`. Curves without length complete nothing, and are left out if there are others.
+        Oriented curves, open or closed, which may be noisy, overlap or cross, or lists of (element, barycentric
+        coordinates), as for `signed_distance`. Curves without length are left out if there are others.
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface.
     diffusion : float
         τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
         the length of the curves' segments, unless the triangles made along them are larger.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-        Imposed on φ at the curves; with `ZeroSet`, the default, the result passes through them. With `EachComponent`
-        and `LevelValues` curves are used as given.
+        Constraint on φ at the curves. With `ZeroSet`, the default, the result passes through them. With `EachComponent`
+        and `LevelValues` no curve is flipped or left out.
     as_oriented : bool
-        Flip no curve, and leave none out.
+        If true, no curve is flipped or left out.
     every_piece : bool
-        Leave no curve out.
+        If true, no curve is left out.
 
     Returns
     -------
     list of Curve
-        Oriented as the given curves, one for each connected component; closed, or ending at the boundary of the
-        surface.
+        One curve for each connected component of the zero set, oriented as the given curves. Each is closed or ends at
+        the boundary of the surface.
 
     Raises
     ------
     SourceError
-        If no curve is oriented, or one does not fit the surface.
+        If no curve is oriented, or a curve names faces that the surface does not have.
 
     See Also
     --------
@@ -123,7 +123,10 @@ def completion(
     as_oriented: bool = False,
     every_piece: bool = False,
 ) -> tuple[Field[SurfaceDomain], list[Curve]]:
-    """Return the distance to broken curves, found on a repaired mesh, along its edges if possible; its zero set."""
+    """Return the signed distance to broken curves, and its zero set, which completes them.
+
+    The arguments are those of `close_curves`. Meshes are repaired first, and both results lie on the given surface.
+    """
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     own_levels = isinstance(constraint, EachComponent | LevelValues)
     surface = cast("SurfaceDomain", converted(domain))
@@ -157,20 +160,23 @@ def refuse_without_sides(curves: Sequence[CurveOrPoints | Sequence[CurveOrPoints
 
 
 def zero_set(field: Field[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve]:
-    """Return the zero set of a field as curves, without loops too short or too far away to complete the given ones."""
+    """Return the zero set of a field as curves, without loops that `LEAST_LOOP` excludes.
+
+    If it excludes all of them, all are returned.
+    """
     if not isinstance(field.domain, TriangleMesh):
         return field.contour(0.0)
     fine = cast("Field[LinearDomain]", field.finest)  # its contours, too, are curves on the given mesh
     surface = discretize(fine.domain)
     assert isinstance(surface, SurfaceDiscretization)
     values = fine.values.copy()
-    beyond_the_rim(surface.triangles, values)  # else contours may run along the rim, where φ only touches 0
+    signed_along_boundary(surface.triangles, values)  # else contours may run along it, where φ only touches 0
     contour = replace(fine, values=values).contour(0.0)
     kept, _ = given_curves(field.domain, as_list(curves))
     given = [each for each in flattened(kept) if isinstance(each, Curve) and each.oriented]
     shortest = min(length(field.domain, each) for each in given)
     near = PointTree(np.concatenate([field.domain.positions(each) for each in given]))
-    completing = [  # open curves end at the rim, and are no stray loops
+    completing = [  # open curves end at the boundary, and are no stray loops
         curve
         for curve in contour
         if not curve.closed
@@ -182,11 +188,11 @@ def zero_set(field: Field[SurfaceDomain], curves: CurvesAndPoints) -> list[Curve
     return completing or contour  # at least one, if all of them are small
 
 
-def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
-    """Replace zeros along the rim by tiny values, in place, so that no contour runs along the rim.
+def signed_along_boundary(triangles: IntrinsicMesh, values: Floats) -> None:
+    """Replace zeros at boundary vertices by tiny values, in place, so that no contour runs along the boundary.
 
-    A row of zeros gets the sign that φ has on the rim beyond both of its ends, or else the one opposite to that of
-    its neighbours.
+    `values` are φ at the vertices, (n,). A run of zeros along the boundary gets the sign that φ has on the boundary
+    beyond both of its ends. If those signs differ, it gets the sign opposite to that of its neighbours.
     """
     least = 1e-7 * float(triangles.lengths_of_edges.mean())
     zero, ends = np.abs(values) <= least, triangles.edges.vertices
@@ -195,7 +201,7 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
     in_row = mask_of(len(values), rim[zero[rim]])
 
     def neighbor_signs(edges: Ints) -> Floats:
-        """Sum of the signs at the other ends of edges from each row."""
+        """Return (n,) sums of the signs of φ at the far ends of edges that leave each run of zeros."""
         tail, head = np.concatenate([edges, edges[:, ::-1]]).T
         out = in_row[tail] & ~zero[head]
         return np.bincount(row[tail[out]], np.sign(values[head[out]]), len(values)).astype(float)
@@ -208,7 +214,7 @@ def beyond_the_rim(triangles: IntrinsicMesh, values: Floats) -> None:
 
 
 def length(mesh: TriangleMesh, curve: Curve) -> float:
-    """Length of a curve, measured straight between its points."""
+    """Return the length of the polygon through a curve's points in space, in the units of the mesh."""
     points = mesh.positions(curve)
     following = np.roll(points, -1, axis=0) if curve.closed else points[1:]
     return float(np.linalg.norm(following - points[: len(following)], axis=1).sum())

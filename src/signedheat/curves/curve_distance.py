@@ -1,6 +1,6 @@
-"""Distance to curves on surfaces in one call: exact where they are there, completed by heat where they are missing.
+"""Signed distance to broken curves on surfaces: exact to the curves, with gaps completed by the signed heat method.
 
-It is measured on a repaired mesh: copies of faces left out, faces flipped to agree.
+It is measured on a repaired mesh, without copies of faces and with faces flipped to agree.
 """
 
 from __future__ import annotations
@@ -38,7 +38,10 @@ from .stroke_directions import CurvePieces, Decision, bound_as_given, decide, pi
 
 
 def warn_of_gaps(mesh: object) -> None:
-    """Warn if vertices of rims are so near others that they may be meant to be one, but too far to be joined."""
+    """Warn if boundary vertices of a mesh are so near others that a seam may be meant, but too far apart to be welded.
+
+    Nothing happens for other domains.
+    """
     if not isinstance(mesh, TriangleMesh | PolygonMesh):
         return
     joined, nearly = (joined_rims(mesh.vertices, *_halfedges(mesh), units) for units in (SEAM_UNITS, GAP_UNITS))
@@ -54,37 +57,38 @@ def warn_of_gaps(mesh: object) -> None:
 
 
 def _halfedges(mesh: TriangleMesh | PolygonMesh) -> tuple[Ints, Ints]:
+    """Return the (h,) first and (h,) second vertices of the halfedges of a mesh, one for each corner of its faces."""
     if isinstance(mesh, PolygonMesh):
         return mesh.corners, mesh.next_corners
     return mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
 
 
 UNTRUSTWORTHY = 0.1
-"""The shortest completion and that by heat are announced as untrustworthy if they differ on this share of the area.
-Half as much announces no more of 259 drawings; two of 30 curves in twelve pieces, half gone, are announced for this
-reason alone, and both are wrong."""
+"""Share of the area above which there is a warning if the shortest completion and that by heat differ on it. With half
+of it there are no more warnings on 259 drawings. Two of 30 curves in twelve pieces, half of them gone, get a warning
+for this reason alone, and both are wrong."""
 
 MOST_LEFT_OUT = 0.25
-"""There is a warning if more than this share of the length of the curves is left out."""
+"""Share of the length of the curves above which there is a warning if it is left out."""
 
 GAP_EDGES = 2.0
-"""Gaps narrower than so many edges are left to heat."""
+"""Width of a gap, in mean edge lengths, above which a shortest path may close it. Heat closes narrower gaps."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurvesTaken(Note):
-    """Which of the curves given were flipped, and which were left out.
+    """Note on the given curves that were flipped, and on those that were left out.
 
     Attributes
     ----------
-    turned : (j,) int
-        Curves whose positive side was made negative.
-    left_out : (k,) int
-        Curves that bound nothing together with the others.
+    turned : list of int
+        Numbers of the curves that were flipped.
+    left_out : list of int
+        Numbers of the curves that were left out, since they bound nothing together with the others.
     share_left_out : float
-        Their share of the length of all curves.
+        Length of the curves left out, as a fraction of the length of all curves.
     """
 
     turned: list[int]
@@ -96,13 +100,13 @@ class CurvesTaken(Note):
         return True
 
     def __str__(self) -> str:
-        taken = [
-            f"{name}: {len(which)}, the first of them number {which[0]}"
-            for name, which in (("curves flipped", self.turned), ("curves left out", self.left_out))
-            if len(which)
+        texts = [
+            f"{name}: {len(numbers)}, the first of them number {numbers[0]}"
+            for name, numbers in (("curves flipped", self.turned), ("curves left out", self.left_out))
+            if len(numbers)
         ]
         share = [f"{self.share_left_out:.2g} of the length left out"] if len(self.left_out) else []
-        return "; ".join(taken + share) or "curves are used as given"
+        return "; ".join(texts + share) or "curves are used as given"
 
 
 def distance_to_pieces(
@@ -113,12 +117,14 @@ def distance_to_pieces(
     numbers: Ints | None = None,
     pieces: CurvePieces | None = None,
 ) -> tuple[Field[Surface], list[CurveOrPoints]]:
-    """Return the distance to curves that may be pieces of broken ones, and the curves that it was measured to.
+    """Return the signed distance, by heat, to curves that may be pieces of broken ones, and the oriented curves.
 
-    Pieces are turned until they bound something together (`curve_orientation`), and those that do not are left out,
-    unless most do not. Where faces cannot agree which side is left, pieces are taken as they are. There is an
-    `InexactWarning` where the answer is a guess. Warnings and notes name curves by `numbers`, (n,), by default their
-    places in the list. `pieces` may have triangles of their own; by default they are found on those of the solver.
+    Pieces are flipped so that they bound something together (`curve_orientation`). Pieces that bound nothing are left
+    out, unless most bound nothing. Where faces cannot be oriented consistently around the curves, these are used as
+    given. An `InexactWarning` says where the answer is a guess.
+
+    Warnings and notes name curves by `numbers`, (n,), by default their indices in the list. `pieces` are the curves as
+    strokes, by default on the triangles of the solver. The curves returned are those that distance was measured to.
     """
     listed = flattened(curves)
     numbers = np.arange(len(listed)) if numbers is None else numbers
@@ -138,11 +144,11 @@ def distance_to_pieces(
     decision = decide(pieces, every_piece)
     turn = decision.turned(len(listed))
     left_out = pieces.curves(decision.loose)
-    taken = [curve for k, curve in enumerate(with_turned(listed, turn)) if k not in set(left_out.tolist())]
-    field = distance_unwarned(once, taken, constraint)
-    closing = closing_curves(field, taken, GAP_EDGES * float(pieces.strokes.surface.triangles.lengths_of_edges.mean()))
+    used = [curve for k, curve in enumerate(with_turned(listed, turn)) if k not in set(left_out.tolist())]
+    field = distance_unwarned(once, used, constraint)
+    closing = closing_curves(field, used, GAP_EDGES * float(pieces.strokes.surface.triangles.lengths_of_edges.mean()))
     if closing:
-        field = distance_unwarned(once, [*taken, *closing], constraint)
+        field = distance_unwarned(once, [*used, *closing], constraint)
     turn[left_out] = False
     share = float(pieces.strokes.lengths[decision.loose].sum() / pieces.strokes.lengths.sum())
     if turn.any() or len(left_out):
@@ -163,11 +169,15 @@ def distance_to_pieces(
         )
     if reason:
         warn_user(reason, InexactWarning)
-    return field, taken
+    return field, used
 
 
 def closing_curves(field: Field[Surface], curves: Sequence[CurveOrPoints], least: float) -> list[Curve]:
-    """Return shortest paths across gaps longer than `least` of curves that nearly close, where heat bulges."""
+    """Return shortest paths along the surface across gaps at which the zero set of the field bulges.
+
+    Only gaps of curves that nearly close count (`Gaps`), and only those longer than `least`, in the units of the
+    surface.
+    """
     surface = field.domain.mesh if isinstance(field.domain, IntrinsicTriangulation) else field.domain
     lines = [curve for curve in curves if isinstance(curve, Curve) and curve.oriented]
     strokes = [curve for curve in lines if not curve.closed]
@@ -179,13 +189,13 @@ def closing_curves(field: Field[Surface], curves: Sequence[CurveOrPoints], least
     paths = []
     for tail, head in gaps.bulging(points, closed, np.concatenate(zero_set), least).tolist():
         ends = ((strokes[tail], [-1]), (strokes[head], [0]))
-        path = surface.shortest_path(*(SurfacePoints(curve.faces[at], curve.barycentric[at]) for curve, at in ends))
+        path = surface.shortest_path(*(SurfacePoints(curve.faces[k], curve.barycentric[k]) for curve, k in ends))
         paths.append(Curve(path.faces, path.barycentric))
     return paths
 
 
 def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
-    """Whether the faces that each curve runs on are connected, and can agree which side of the curve is left."""
+    """Whether every curve has a left and a right side: the faces it runs on are connected and can be oriented alike."""
     mesh = mesh.joined
     if (mesh.edges.face_counts == 2 - (mesh.edges.balance != 0)).all():
         return True
@@ -200,10 +210,10 @@ def has_sides(mesh: TriangleMesh, curves: Sequence[CurveOrPoints]) -> bool:
 
 
 def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
-    """(m,) faces of a sheet in a mesh some of whose edges have three faces or more.
+    """Return (m,) bool, true for the faces of a sheet in a mesh with edges of three or more faces.
 
-    Parts are added one by one, those that curves cross first, then the largest, unless they would put a third face on
-    an edge that others use, as fins and tents do.
+    `crossed` are the ids of faces that curves cross. Connected parts are added one by one, first those that curves
+    cross, then the largest. A part that would put a third face on an edge of the sheet is left out.
     """
     edges = mesh.edges
     part = connected_components(mesh.n_faces, *(edges.pairs // 3).T)
@@ -221,10 +231,10 @@ def sheet_faces(mesh: TriangleMesh, crossed: Ints) -> Bools:
 
 
 def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence[CurveOrPoints], numbers: Ints) -> str:
-    """Return, as a warning, why the region that the curves bound is a guess, and what to do; "" if it is no guess.
+    """Return the text of a warning that says why the region that the curves bound is a guess, and what to do.
 
-    `field` is the distance, completed by heat, to the curves that were not left out. `curves` are all curves given,
-    which the warning calls by their `numbers`, (n,).
+    The text is empty if the region is no guess. `field` is the distance, completed by heat, to the curves that were not
+    left out. `curves` are all n given curves, which the text names by their `numbers`, (n,).
     """
     as_given = (
         'as_oriented=True takes curves as they are, and completion="none" measures unsigned distance, as to roads with '
@@ -270,7 +280,7 @@ def reason_for_doubt(decision: Decision, field: Field[Surface], curves: Sequence
 
 
 def named(numbers: Ints) -> str:
-    """Return the numbers of some curves in words."""
+    """Return a text such as "curves number 3, 5" that names curves by up to eight of their numbers."""
     listed = ", ".join(map(str, numbers[:8].tolist())) + (", …" if len(numbers) > 8 else "")
     return f"curves number {listed}" if len(numbers) > 1 else f"curve number {listed}"
 
@@ -286,10 +296,10 @@ def distance_to_curves(
     every_piece: bool = False,
     progress: Progress | None = None,
 ) -> Field[AnySurface]:
-    """Signed distance to curves and points on a surface: see `signed_distance`, which calls this.
+    """Compute the signed distance to curves and points on a surface, with the options of `signed_distance`.
 
-    The signed heat method decides the sides and completes what is missing; then distance is measured along the surface,
-    exactly, to the curves themselves and to what completes them (`sharpen`).
+    The signed heat method decides which side is positive and closes the gaps of the curves. Then exact distance along
+    the surface is measured to the curves and to what closes their gaps (`sharpen`).
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(
@@ -311,6 +321,7 @@ def distance_to_curves(
     numbers = numbers_given(listed, left_out)
 
     def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints | None]:
+        """Return the field by a solver, and the curves to sharpen it to; None for these if it is exact already."""
         flat = flattened(listed)
         by = triangulated_once(by, flat)
         surface_of(by).segments(flat)  # refuses curves that do not fit
@@ -325,9 +336,9 @@ def distance_to_curves(
             return distance_unwarned(by, given, constraint), listed
         return distance_to_pieces(by, listed, constraint, every_piece, numbers, pieces)
 
-    field, taken = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
-    sharpened = field if taken is None else sharpen(field, taken, progress=within(progress, 0.7, 1.0))
-    if taken is None and progress is not None:
+    field, used = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
+    sharpened = field if used is None else sharpen(field, used, progress=within(progress, 0.7, 1.0))
+    if used is None and progress is not None:
         progress(1.0, "done")
     if repaired is not None:
         sharpened = repaired.on_given(sharpened)
@@ -337,7 +348,7 @@ def distance_to_curves(
 def distance_by_sides(
     solver: SignedHeatSolver[Any], curves: CurvesAndPoints, progress: Progress | None
 ) -> Field[Any] | None:
-    """Return the distance to curves that decide by themselves which side every vertex is on; None if heat must."""
+    """Return the exact distance to curves that decide the side of every vertex without heat, or None if some do not."""
     if not isinstance(solver.domain, TriangleMesh):
         return None
     report = None if progress is None else (lambda: progress(0.7, "distance"))

@@ -1,4 +1,4 @@
-"""Surfaces cut along lines, across which a field that is linear in every triangle may jump."""
+"""Surfaces cut along edges, across which a field that is linear in every triangle may jump."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ class Cut(Frozen):
     Attributes
     ----------
     vertices : (k,) int
-        Vertices of `CutSurface.triangulation`, in order; the first is repeated at the end if the line is closed.
+        Ids of vertices of `CutSurface.triangulation`, in order along the line. A closed line repeats the first at the
+        end.
     points : (k, 3) float
-        Their positions.
+        Positions of these vertices, in the units of the surface.
     jumps : (k - 1, 2) float
         Absolute difference of the field between the two sides of each edge, at the two ends of the edge.
     steps : (k - 1,) float
@@ -57,7 +58,7 @@ class Cut(Frozen):
 
     @property
     def height(self) -> float:
-        """Mean jump along the cut."""
+        """Mean jump of the field along the cut, weighted by length, in the units of the field."""
         return float(np.average(self.jumps.mean(axis=1), weights=self.steps))
 
     def __repr__(self) -> str:
@@ -66,18 +67,19 @@ class Cut(Frozen):
 
 @dataclass(frozen=True, eq=False)
 class CutSurface(LinearDomain, Frozen):
-    """A surface cut along edges: the domain of the fields of `piecewise_distance`, which may jump there.
+    """A surface cut along edges, across which the fields of `piecewise_distance` may jump.
 
-    Values are (m, 3), at the corners of the triangles, NaN where no source is connected.
+    Fields on it have (m, 3) values, at the three corners of each of its m triangles, and NaN where no source is
+    connected.
 
     Attributes
     ----------
     surface : TriangleMesh, PolygonMesh or IntrinsicTriangulation
-        The whole surface.
+        The surface before it is cut.
     triangles : IntrinsicMesh
-        Its triangles, or those of the virtual refinement of its polygons, as an intrinsic mesh.
+        Its triangles, or those into which its polygons are divided, with their edge lengths.
     is_cut : (p,) bool
-        Those of the `pairs` of triangles that the cut separates.
+        True for each pair of neighbouring triangles in `pairs` that the cut separates.
 
     See Also
     --------
@@ -102,12 +104,12 @@ class CutSurface(LinearDomain, Frozen):
 
     @property
     def triangulation(self) -> TriangleMesh | IntrinsicTriangulation:
-        """The triangles at whose corners fields have values."""
+        """Triangulation at whose corners fields have values: the surface, or the triangles that divide its polygons."""
         return self.surface if isinstance(self.surface, IntrinsicTriangulation) else self.surface.triangulation
 
     @property
     def n_vertices(self) -> int:
-        """Number of vertices of the triangles, each counted once."""
+        """Number of vertices of the triangles before the surface is cut."""
         return self.triangulation.n_vertices
 
     @cached_property
@@ -116,17 +118,17 @@ class CutSurface(LinearDomain, Frozen):
         return face_pairs(self.triangles)
 
     def jumps(self, values: Floats) -> Floats:
-        """Compute the jump of a field across each edge.
+        """Compute the jumps of a field across the edges between neighbouring triangles.
 
         Parameters
         ----------
         values : (m, 3) float
-            Those of the field.
+            Values of the field at the corners of the triangles, as in `Field.values`.
 
         Returns
         -------
         (p, 2) float
-            Jump at the two ends of the edge between the faces of each of the `pairs`.
+            Value in the first triangle of each of the `pairs` less that in the second, at the two ends of their edge.
 
         See Also
         --------
@@ -141,17 +143,17 @@ class CutSurface(LinearDomain, Frozen):
         return self.pairs.ends(values)
 
     def cuts(self, values: Floats) -> list[Cut]:
-        """Return the lines across which a field is discontinuous, longest first.
+        """Return the lines along which the surface is cut, longest first, with the jumps of a field.
 
         Parameters
         ----------
         values : (m, 3) float
-            Those of the field.
+            Values of the field at the corners of the triangles, as in `Field.values`.
 
         Returns
         -------
         list of Cut
-            Empty if the surface is not cut.
+            One for each line, in the units of the surface; empty if the surface is not cut.
 
         See Also
         --------
@@ -183,7 +185,7 @@ class CutSurface(LinearDomain, Frozen):
 
     @cached_property
     def split_vertices(self) -> tuple[Ints, Ints]:
-        """(3m,) vertex of the surface cut open at each corner, and the original vertex of each of those."""
+        """Vertices of the surface cut open: (3m,) the vertex at each corner, and (n,) the original of each vertex."""
         owner = split_corners(self.triangles, self.pairs, self.is_cut)
         _, first = np.unique(owner, return_index=True)
         return owner, self.triangulation.faces.ravel()[first]
@@ -194,12 +196,12 @@ class CutSurface(LinearDomain, Frozen):
         Parameters
         ----------
         values : (m, 3) float
-            Those of the field.
+            Values of the field at the corners of the triangles, as in `Field.values`.
 
         Returns
         -------
         (n,) float
-            One for each vertex of `split_vertices`.
+            Mean value at each vertex of `split_vertices`.
 
         See Also
         --------
@@ -229,7 +231,7 @@ class CutSurface(LinearDomain, Frozen):
         return self._plain(values)
 
     def _plain(self, values: Floats) -> tuple[TriangleMesh | PolygonMesh, Floats]:
-        """Return the field on a mesh whose vertices are doubled along the cut; elsewhere they have the means."""
+        """Return a mesh whose vertices are doubled along the cut, and the (n,) mean values at its vertices."""
         if isinstance(self.surface, IntrinsicTriangulation):
             return self._in_space(self.surface, values)
         owner, vertices = self.split_vertices
@@ -237,7 +239,10 @@ class CutSurface(LinearDomain, Frozen):
         return mesh, self.means(values)
 
     def _in_space(self, surface: IntrinsicTriangulation, phi: Floats) -> tuple[PolygonMesh, Floats]:
-        """Move a field to the common subdivision of mesh and triangulation, with vertices doubled along the cut."""
+        """Move a field to the common subdivision of a triangulation and its mesh, with vertices doubled along the cut.
+
+        `phi` are values at the corners of the triangles, (m, 3). Returns the polygons and the values at their vertices.
+        """
         triangles, n = self.triangles, surface.n_vertices
         polygons, owners, where = subdivided(surface)
         sizes = [len(polygon) for polygon in polygons]
@@ -271,13 +276,16 @@ class CutSurface(LinearDomain, Frozen):
 
 @dataclass(frozen=True, eq=False)
 class CutInterpolant:
-    """Linear interpolation in each triangle; on edges, in the triangle through which a point is given."""
+    """Linear interpolation in each triangle of a cut surface.
+
+    A point on an edge gets the value of the triangle in which it is given, since values may jump there.
+    """
 
     domain: CutSurface
     values: Floats  # (m, 3) at the corners of the triangles
 
     def __call__(self, points: Any) -> Floats:
-        """Return (...) values at points that `placed` takes."""
+        """Return (...) values at (..., 3) points, a `Curve` or `SurfacePoints`."""
         faces, weights, shape = placed(self._mesh, points)
         if isinstance(self.domain.surface, IntrinsicTriangulation):
             faces, weights = self.domain.surface.locate(faces, weights)
@@ -286,7 +294,7 @@ class CutInterpolant:
         return shaped((self.values[places.faces] * places.barycentric).sum(axis=1), shape)
 
     def gradient(self, points: Any) -> Floats:
-        """(..., 3) gradients in space."""
+        """Return (..., 3) gradients, as vectors in space, at points as for a call."""
         faces, weights, shape = placed(self._mesh, points)
         if isinstance(self.domain.surface, IntrinsicTriangulation):
             return shaped(self.domain.surface.gradient(self.values, faces, weights), shape)
@@ -295,12 +303,13 @@ class CutInterpolant:
 
     @property
     def _mesh(self) -> TriangleMesh:
+        """The triangle mesh in space in which points are located."""
         surface = self.domain.surface
         return surface.mesh if isinstance(surface, IntrinsicTriangulation) else surface.triangulation
 
     @cached_property
     def cell_gradients(self) -> Floats:
-        """(m, 3) gradients in the triangles, in space."""
+        """Constant gradient in each of the m triangles, a vector in space, (m, 3) float."""
         surface = self.domain.triangulation
         if isinstance(surface, IntrinsicTriangulation):
             raise GeometryError(

@@ -1,4 +1,4 @@
-"""Signed distance to drawings in the plane: what outlines fill, strokes, and by heat what completes them."""
+"""Signed distance to drawings in the plane, made of filled outlines and of strokes whose gaps heat completes."""
 
 from __future__ import annotations
 
@@ -41,13 +41,15 @@ FINEST_DRAWING = 1024
 """Largest number of cells along a drawing with which it is completed, however fine the grid is. Three broken drawings
 differ by 0.010 of their radius between 128 and 512 cells, by 0.007 between 128 and 256."""
 STROKE_NODES = 96
-"""Number of nodes along the longest side of the triangles on which strokes are compared. Of 150 drawings none is wrong
-in silence and 7 are right with a warning; halved 0 and 5, doubled 0 and 6."""
+"""Number of nodes along the longest side of the triangle mesh on which strokes are oriented. Of 150 drawings none is
+wrong without a warning and 7 are right with one; halved 0 and 5, doubled 0 and 6."""
 LEAST_SLOPE = 1e-6
-"""Component, along the sum of the unit normals at a corner, of the direction to a point, from which on it decides the
-side. Of 13,440 points beside spikes 355 are wrong, from 1e-6 to 0.1, all at spikes of 1e-8 or less. At 0 1,744 are."""
+"""Least component along the normal, of the unit vector from the nearest place to a point, for which the normal decides
+the side of the point. Below it rays decide. At corners the normal is the sum of the unit normals. Of 13,440 points
+beside spikes 355 are wrong, from 1e-6 to 0.1, all at spikes of 1e-8 or less. At 0 1,744 are."""
 SIDE_CELLS = 1.5
-"""Within this distance, in cells, a line decides the side itself: φ is smooth over about a cell."""
+"""Distance from a line, in cells, below which the line itself decides the side; beyond it the sign of φ does. φ is
+smooth over about a cell."""
 
 
 def distance_to_lines(
@@ -64,12 +66,12 @@ def distance_to_lines(
     every_piece: bool = False,
     progress: Progress | None = None,
 ) -> Field[Grid]:
-    """Signed distance to polylines in the plane: see `signed_distance`, which calls this.
+    """Compute the signed distance to polylines in the plane, with the options of `signed_distance`.
 
-    Closed outlines become the boundary of what they fill. If strokes are left, they are turned until they bound
-    something together; the signed heat method decides the sides on a grid around the whole drawing, and completes the
-    lines. What is bounded is inside, whichever way it runs. In other dimensions than two, φ is returned as the method
-    gives it.
+    Closed outlines are replaced by the boundary of the region that they fill. Strokes, if there are any, are flipped so
+    that they bound something together. Then the signed heat method decides the sides on a grid around the whole
+    drawing, and closes gaps. The bounded region is inside, whatever the orientation of its boundary. If the grid has
+    other than two dimensions, the result is φ of `SignedHeatSolver`.
     """
     if isinstance(constraint, EachComponent | LevelValues):
         raise ConstraintError(
@@ -117,7 +119,7 @@ def unsigned_distance_to_lines(
     completion: Literal["none"] = "none",
     progress: Progress | None = None,
 ) -> Field[Grid]:
-    """Unsigned distance to polylines in the plane, with nothing completed: see `signed_distance`, which calls this."""
+    """Compute the unsigned distance to polylines in the plane, without completion; see `signed_distance`."""
     listed: list[Any] = as_list(lines)
     for number, line in enumerate(listed):
         if not isinstance(line, Polyline):
@@ -141,9 +143,10 @@ def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: 
 
 
 def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
-    """Return lines of which each that nearly closes runs round what is inside if it is within an even number of others.
+    """Orient open lines that nearly close as outlines, by the number of other outlines that enclose each of them.
 
-    Closed lines are outlines of what is inside already.
+    Inside an even number of others a line bounds a filled region, inside an odd number a hole. Lines that are closed or
+    do not nearly close are returned as they are.
     """
     gaps = [np.linalg.norm(line.points[-1] - line.points[0]) for line in lines]
     nearly = [k for k, line in enumerate(lines) if not line.closed and gaps[k] < NEARLY_CLOSED * line.length]
@@ -164,13 +167,17 @@ def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
 
 
 def closing_lines(lines: Sequence[Polyline]) -> list[Polyline]:
-    """Return straight lines across the gaps of curves that nearly close, from the end of a stroke to the next one."""
+    """Return straight lines across the gaps of curves that nearly close, from the end of each stroke to the next."""
     strokes = [line for line in lines if not line.closed]
     return [Polyline(line) for line in Gaps.of([line.points for line in strokes]).lines] if strokes else []
 
 
 def bulges(phi: Field[Grid[Literal[2]]], lines: Sequence[Polyline], closing: Sequence[Polyline]) -> bool:
-    """Return whether heat leaves a gap open, as between parallel strokes, or closes it by a bulge as long as itself."""
+    """Whether the zero set of φ fails to close the gaps of lines by short lines.
+
+    It fails if it runs out of the grid, or if a point of it is farther from the lines and the straight `closing` lines
+    than the longest of the latter.
+    """
     beyond = values_at_walls(phi.values) < 0
     if beyond.any() and not beyond.all():
         return True
@@ -179,7 +186,10 @@ def bulges(phi: Field[Grid[Literal[2]]], lines: Sequence[Polyline], closing: Seq
 
 
 def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
-    """Return a grid around all sources, with cells at most as large as those where distance is asked."""
+    """Return a grid around all sources on which heat flows; its cells are about as small as those of the grid `asked`.
+
+    There are at least `RESOLUTION` and at most `FINEST_DRAWING` cells along the longest side of the sources.
+    """
     bounds = bounds_around(sources)
     size = float(np.ptp(bounds, axis=0).max())
     if size == 0:
@@ -190,9 +200,10 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
 def strokes_that_agree(
     lines: Sequence[Polyline], numbers: Sequence[int], every_piece: bool, progress: Progress | None
 ) -> tuple[list[Polyline], CurvesTaken | None]:
-    """Turn strokes and leave some out, as `distance_to_pieces` does on a rectangle around them; also return a note.
+    """Flip strokes so that they bound something together, and leave out those that do not.
 
-    Warnings and the note name the lines by `numbers`, which differ.
+    `distance_to_pieces` decides that on a triangle mesh of a rectangle around the lines. Also returns its note, None if
+    all lines are used as given. Warnings and the note name the lines by `numbers`.
     """
     if all(line.closed for line in lines):
         return list(lines), None
@@ -209,12 +220,12 @@ def strokes_that_agree(
     if note is None:
         return list(lines), None
     turned, left_out = set(note.turned), set(note.left_out)
-    taken = [(k, line) for k, line in zip(numbers, lines, strict=True) if k not in left_out]
-    return [line.reversed() if k in turned else line for k, line in taken], note
+    used = [(k, line) for k, line in zip(numbers, lines, strict=True) if k not in left_out]
+    return [line.reversed() if k in turned else line for k, line in used], note
 
 
 def _triangles_around(bounds: Floats) -> TriangleMesh:
-    """Return a rectangle of triangles around a box, with some room: squares cut along either diagonal in turn."""
+    """Return a triangle mesh of a rectangle around a box, (2, 2) corners, made of squares with one diagonal each."""
     nodes = Grid.around(bounds, STROKE_NODES)
     index = np.arange(nodes.n_nodes).reshape(nodes.shape)
     a, b, c, d = (ids.ravel() for ids in (index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]))
@@ -225,24 +236,24 @@ def _triangles_around(bounds: Floats) -> TriangleMesh:
 
 
 def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
-    """(m, 2, 2) the ends of all segments, line after line."""
+    """Return the ends of all segments of lines in the plane, line after line, as (m, 2, 2) coordinates."""
     return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing(Frozen):
-    """Segments in the plane to which distance can be measured exactly at any point."""
+    """Segments in the plane to which signed distance can be measured exactly at any point."""
 
-    lines: Floats  # (m, 2, 2) ends of the segments that were given. Distance is positive to their left
-    # (k, 2, 2) segments where lines are missing
+    lines: Floats  # (m, 2, 2) ends of the given segments; distance is positive to their left
+    # (k, 2, 2) ends of the segments that close gaps
     completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
-    # decides the side at the completion and away from lines. Without it, lines are outlines of what is inside
+    # its sign decides the side farther than `SIDE_CELLS` from lines. Without it, lines are closed outlines
     phi: Field[Grid[Literal[2]]] | None = None
     has_sides: bool = True  # whether distance is negative on one side of lines
 
     @classmethod
     def completed(cls, lines: Floats, phi: Field[Grid[Literal[2]]]) -> Drawing:
-        """Make a drawing of lines and of the zero set of φ where that is far from them."""
+        """Make a drawing of (m, 2, 2) segments and of the parts of the zero set of φ that are far from them."""
         crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
         zero_set = segments_of_lines(phi.contour()) if crosses else np.empty((0, 2, 2))
         if len(lines) and len(zero_set):
@@ -252,11 +263,12 @@ class Drawing(Frozen):
 
     @property
     def triangles(self) -> Floats:
-        """(m + k, 3, 2) the segments, as triangles without area."""
+        """Given segments and those of the completion as m + k triangles without area, (m + k, 3, 2) corners."""
         return self._segments[:, [0, 1, 1]]
 
     @cached_property
     def _segments(self) -> Floats:
+        """Given segments, then those of the completion, (m + k, 2, 2)."""
         return np.concatenate([self.lines, self.completion])
 
     @cached_property
@@ -265,7 +277,11 @@ class Drawing(Frozen):
 
     @cached_property
     def _corners(self) -> tuple[Ints, Floats, Ints]:
-        """Return (m, 2) corners at ends of lines, (c, 2) sums of unit normals of lines at corners, their number."""
+        """Return the c distinct ends of lines, called corners, and what meets there.
+
+        These are (m, 2) the corner at both ends of each segment, (c, 2) the sum of the unit normals of the segments at
+        each corner, and (c,) the number of these segments.
+        """
         along = self.lines[:, 1] - self.lines[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
         corners, places = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
@@ -276,16 +292,20 @@ class Drawing(Frozen):
         )
 
     def distance(self, points: ArrayLike) -> Floats:
-        """(...) signed distances of (..., 2) points, negative inside and to the right of lines."""
+        """Return (...) signed distances of (..., 2) points, negative inside and to the right of lines."""
         places, shape = query_points(points, 2)
         return shaped(self._closest(places)[0], shape)
 
     def inside(self, points: ArrayLike) -> Bools:
-        """(...) whether (..., 2) points are inside."""
+        """Return (...) bool, true where the signed distance of (..., 2) points is negative."""
         return self.distance(points) < 0
 
     def closest(self, points: ArrayLike) -> Closest:
-        """Return the nearest place for each of (..., 2) points; faces are segments, with weights of their two ends."""
+        """Return the nearest points of the drawing for (..., 2) points, as `Solid.closest` does in space.
+
+        In the result, faces are given segments, −1 on the completion, and barycentric weights are those of the two ends
+        of the segment.
+        """
         places, shape = query_points(points, 2)
         distances, nearest, segments = self._closest(places)
         ends = self._segments[segments]
@@ -305,7 +325,7 @@ class Drawing(Frozen):
         return Closest(*(shaped(result, shape) for result in results))
 
     def _closest(self, points: Floats) -> tuple[Floats, Floats, Ints]:
-        """Return the signed distances of (n, 2) points, the nearest places, and the segments on which these lie."""
+        """Return (n,) signed distances of (n, 2) points, the (n, 2) nearest points, and the segments of these, (n,)."""
         found = self._tree.search(_in_space(points))
         nearest, places = self._tree.features.ids[found.faces], found.places[:, :2]
         if not self.has_sides:
@@ -318,7 +338,12 @@ class Drawing(Frozen):
         return sides * found.distances, places, nearest
 
     def _sides(self, points: Floats, places: Floats, nearest: Ints) -> Floats:
-        """(n,) 1 to the left of the nearest line, −1 to its right; at corners, by the sum of all normals there."""
+        """Return (n,) 1 for points to the left of the nearest segment, −1 for points to its right.
+
+        `places` are the nearest points, (n, 2), and `nearest` their segments, (n,). If that is an end of the segment,
+        the sum of the normals of all segments there decides. Where this is unreliable and lines are closed outlines,
+        the number of outlines around the point decides.
+        """
         corners, sums, counts = self._corners
         ends = self.lines[nearest]
         along = ends[:, 1] - ends[:, 0]
@@ -339,12 +364,16 @@ class Drawing(Frozen):
 
 
 def _in_space(points: Floats) -> Floats:
-    """(n, 3) points of the plane z = 0."""
+    """Append z = 0 to (n, 2) points."""
     return np.pad(points, ((0, 0), (0, 1)))
 
 
 def tree_of(segments: Floats) -> FaceTree:
-    """Make a tree of triangles that stand upright on segments (m, 2, 2): those are nearest to points of the plane."""
+    """Make a search tree for the nearest of m segments in the plane z = 0, with ends (m, 2, 2).
+
+    Each segment is the side of a triangle that stands upright on the plane, so that the triangle's nearest point to a
+    point in the plane lies on the segment.
+    """
     a, b = segments.transpose(1, 0, 2)
     corners = np.pad(np.stack([a, b, (a + b) / 2], axis=1), ((0, 0), (0, 0), (0, 1)))
     corners[:, 2, 2] = np.linalg.norm(b - a, axis=1)
@@ -352,7 +381,10 @@ def tree_of(segments: Floats) -> FaceTree:
 
 
 def _enclosed(outlines: Floats, points: Floats) -> Bools:
-    """(n,) whether points are within outlines that do not cross: rays from them meet an odd number of segments."""
+    """Return (n,) bool, true for (n, 2) points from which a ray meets an odd number of (m, 2, 2) segments.
+
+    These points are inside if the segments form closed outlines that do not cross.
+    """
     inside = np.zeros(len(points), dtype=bool)
     a, b = outlines.transpose(1, 0, 2)
     step = max(1, 10**6 // max(len(outlines), 1))  # a million pairs at a time

@@ -1,4 +1,4 @@
-"""Gaps of curves that nearly close, and where heat bulges there, drawn to other curves beside the gap."""
+"""Gaps of curves that nearly close, and those gaps at which the completion by heat bulges towards other curves."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from ..parallel import PointTree
 from ..surfaces.source_segments import NEARLY_CLOSED
 
 BULGE = 0.1
-"""Heat bulges at a gap if its line is farther than this from the straight one, relative to the length of that, while
-another curve is nearer than that length. Of nine bands on a sphere, with a gap in a rim each, 1 to 11 % of eight are
-wrong without straight lines, and at 0.25; none is at 0.1, nor at 0.05. Of 18 random drawings none bulges at 0.05."""
+"""Distance of the zero set from the straight line across a gap, relative to the width of the gap, above which it counts
+as a bulge, if another curve is nearer to that line than the width. Of nine bands on a sphere, each with a gap in its
+boundary, 1 to 11 % of eight are wrong without straight lines, and at 0.25; none is at 0.1, nor at 0.05. Of 18 random
+drawings none bulges at 0.05."""
 POINTS_ACROSS = 16
-"""Points on the straight line across a gap, to which distance is measured."""
+"""Number of points on the straight line across a gap to which distances are measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gaps:
-    """Gaps of curves that nearly close.
+    """Gaps between the k open strokes of curves that nearly close.
 
-    Strokes are one curve if they follow each other, each the nearest one to the end of the last.
+    A stroke is followed by the one that begins nearest to its end. Strokes that follow each other form one curve.
     """
 
-    strokes: Ints  # (g, 2) numbers of the stroke that ends at a gap, and of the next to begin
-    lines: Floats  # (g, 2, d) straight lines from the one to the other
-    curve: Ints  # (k,) the curve that each stroke is part of
+    strokes: Ints  # (g, 2) index of the stroke that ends at each gap, and of the one that begins there
+    lines: Floats  # (g, 2, d) ends of the straight line across each gap
+    curve: Ints  # (k,) label of the curve that each stroke is part of
 
     @classmethod
     def of(cls, strokes: Sequence[Floats]) -> Gaps:
-        """Find the gaps of open strokes, (n, d) points each, at least one."""
+        """Find the gaps between open strokes, each given by (n, d) points; there is at least one stroke."""
         begins, ends = (np.array([points[k] for points in strokes]) for k in (0, -1))
         lengths = [np.linalg.norm(np.diff(points, axis=0), axis=1).sum() for points in strokes]
         gaps, following = PointTree(begins).query(ends)
@@ -44,9 +45,10 @@ class Gaps:
         return cls(pairs, np.stack([ends[wide], begins[following[wide]]], axis=1), curve)
 
     def bulging(self, strokes: Sequence[Floats], closed: Sequence[Floats], line: Floats, least: float) -> Ints:
-        """(b, 2) `strokes` of gaps longer than `least` at which the completion, points (n, d) of a line, bulges.
+        """Return (b, 2) `strokes` of the gaps wider than `least` at which a completion of the curves bulges.
 
-        Points count for the gap that they are nearest to, if no stroke or closed curve is nearer.
+        `line` are (n, d) points of the completion. Each counts for the gap whose straight line is nearest to it, unless
+        a stroke or a `closed` curve is nearer. `BULGE` says what a bulge is.
         """
         tails, heads = self.lines.transpose(1, 0, 2)
         widths = np.linalg.norm(heads - tails, axis=1)
@@ -56,11 +58,11 @@ class Gaps:
         counts = away < PointTree(drawn).query(line)[0]
         height = np.zeros(len(widths))
         np.maximum.at(height, nearest[counts] // POINTS_ACROSS, away[counts])
-        # every closed curve is one of its own
-        names = np.concatenate([self.curve, self.curve.max() + 1 + np.arange(len(closed))])
-        name = np.repeat(names, [len(points) for points in (*strokes, *closed)])
+        # every closed curve gets a label of its own
+        labels = np.concatenate([self.curve, self.curve.max() + 1 + np.arange(len(closed))])
+        label = np.repeat(labels, [len(points) for points in (*strokes, *closed)])
         own, chosen = self.curve[self.strokes[:, 0]], (widths > least) & (height > BULGE * widths)
         for gap in np.flatnonzero(chosen).tolist():
-            others = drawn[name != own[gap]]
+            others = drawn[label != own[gap]]
             chosen[gap] = len(others) and PointTree(others).query(across[gap])[0].min() < widths[gap]
         return self.strokes[chosen]

@@ -1,8 +1,8 @@
 """Signed distance to curves that bound no region: piecewise-continuous integration (Sec. 7.2, Eq. 15, Eq. 16).
 
 In Eq. 16 φ is linear in every face with gradient exactly Y, so it is known up to one constant per face. Where Y is
-integrable, the constants make φ continuous across edges; elsewhere φ jumps, and the weighted L1 norm concentrates the
-jumps on a cut that is short and runs where Y is not integrable. On the surface cut open there, step 3 integrates Y.
+integrable, the constants make φ continuous across edges. Elsewhere φ jumps, and the weighted L1 norm concentrates the
+jumps on a short cut. On the surface cut open there, step 3 integrates Y.
 """
 
 from __future__ import annotations
@@ -47,12 +47,13 @@ from .cut_surface import CutSurface
 from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_continuous, minimize, smoothed
 
 ROUGH_INTEGRATION = 1.0
-"""Integration error above which there is a warning: as large as the slopes themselves."""
+"""Root mean square of ∇φ − Y above which there is a warning. The length of Y is 1, too."""
 
 SOURCE_CUT = 100.0
 """Factor by which a cut along or across the source is more expensive than elsewhere."""
 BYTES_WITH_JUMPS = {"pardiso": (2600, 0), "superlu": (525, 182)}
-"""Measured peak memory per triangle, and what each doubling of their number adds, by back end."""
+"""Measured peak memory in bytes per triangle, for each back end: a constant, and an amount for each doubling of the
+number of triangles."""
 
 
 @public_call
@@ -65,57 +66,62 @@ def piecewise_distance(
     smooth: bool = True,
     progress: Progress | None = None,
 ) -> Field[CutSurface]:
-    """Signed distance to curves that need not bound a region, with jumps where no continuous distance exists.
+    """Compute a signed distance to curves that need not bound a region; it jumps where no continuous one exists.
 
-    A loop around the tube of a torus has no inside, as left and right of it are connected. No continuous function is
-    signed distance to it. This one is positive to the left of curves, negative to their right, and jumps along lines
-    away from them, its *cut*. Of all cuts, it is the one with the least sum of jump times length, with weights.
+    A loop around the tube of a torus has no inside, since its left and right sides are connected. No continuous
+    function is a signed distance to it. The field φ returned here is positive to the left of curves and negative to
+    their right. It jumps along lines away from the curves, called its *cut*. Of all cuts it has the one with the least
+    total of jump times length, with the weights below.
 
-    Minimises ``Σ_e |e| exp(−κ_e) (|jump at one end| + |jump at the other|)`` over functions whose gradient in every
-    triangle is the diffused, normalised source normal Y; κ_e is the difference between the components of Y along e in
-    the two faces at e (Eq. 15, Eq. 16). Edges at the source have 100 times the weight, so that the cut avoids the
-    source wherever possible. Large jumps lie on few lines: on the surface cut open there, step 3 (Eq. 13) makes φ
-    continuous, with slopes near Y. For curves that bound a region the field has no cut, and differs from that of
-    `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean square, λ the least positive
-    eigenvalue of the Laplacian. Surfaces may have any topology, orientable or not; curves whose parts have opposite
-    orientations get a cut that joins the points at which the orientation changes.
+    The surface may have any topology, orientable or not. Curves that bound a region get no cut. Curves whose parts run
+    in opposite directions get a cut that joins the points where the direction changes.
+
+    Notes
+    -----
+    Let Y be the diffused and normalised source normals. First, φ is the function with gradient Y in every triangle
+    that minimises ``Σ_e |e| exp(−κ_e) (|jump at one end of e| + |jump at the other|)`` over all edges e, where κ_e is
+    the difference between the components of Y along e in the two faces at e (Eq. 15, Eq. 16). Edges at the source have
+    100 times the weight, which keeps the cut away from the source. Second, the surface is cut open along the lines of
+    large jumps, and step 3 of the method (Eq. 13) makes φ continuous on it, with gradients near Y.
+
+    Without a cut, φ differs from `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean
+    square, where λ is the least positive eigenvalue of the Laplacian.
 
     Parameters
     ----------
     sources : Curve, SurfacePoints, or a sequence of them
-        If unoriented curves do not run along edges, the surface is retriangulated so that they do: the domain of the
-        field is then ``intrinsic_delaunay(surface, keep=sources)``, which can also be passed as the domain.
+        The curves and points. If unoriented curves do not run along edges, the surface is retriangulated so that they
+        do. The field then lies on ``intrinsic_delaunay(surface, keep=sources)``, which can also be passed as `domain`.
     domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
         The surface.
     diffusion : float
         τ in ``t = τ h²``, the time for which normals of the curves are diffused like heat, with h half the mean
         length of edges. Larger values close gaps along rounder lines.
     intrinsic : "auto", True or False
-        As for `SignedHeatSolver`: "auto" refines a triangle mesh intrinsically where large angles or needles would
-        spoil directions. The domain of the field is then the refinement.
+        Whether φ is computed on an intrinsic triangulation, as for `SignedHeatSolver`. "auto" refines a triangle mesh
+        intrinsically if large angles or thin triangles would spoil directions. The field then lies on the refinement.
     smooth : bool
-        Whether φ is made continuous off its cut: step 3 (Eq. 13) on the surface cut open there. False leaves all jumps
-        as Eq. 16 does, and the gradient is Y in every triangle: better where halves of a curve face each other.
+        Whether φ is made continuous away from its cut. If false, the second step is left out, so that small jumps
+        remain and the gradient is Y in every triangle. That is better where halves of a curve face each other.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
     Field
-        φ in the units of the surface, with median zero over the source. The objective is certified to be within 0.2 %
-        of the least, in minutes for 300 thousand faces, or within 15 % if φ has no cut, because jumps smaller than the
-        triangles are left.
-        ``diagnostics.note(Jumps)`` has the objective, a lower bound of it, and the size of the jumps. If the triangles
-        are so large or thin that φ has hardly the slope that it should, there is an `InexactWarning`.
+        φ in the units of the surface, with median zero over the source. ``diagnostics.note(Jumps)`` has the objective
+        of the minimisation, a lower bound of it, and the size of the jumps. The objective is within 0.2 % of the
+        least, or within 15 % if φ has no cut. For 300 thousand faces that takes minutes. There is an `InexactWarning`
+        if triangles are so large or thin that gradients of φ differ much from Y.
 
     Raises
     ------
     SourceError
         If a source does not fit the surface, or an unoriented curve was not kept by an intrinsic triangulation.
     UnsupportedTypeError
-        If the domain is none of these.
+        If the domain is no such surface.
     GeometryError
-        With ``intrinsic=True``, if the domain is no triangle mesh.
+        If ``intrinsic=True``, and the domain is no triangle mesh.
     MemoryLimitError
         If the field does not fit into memory; nothing has been allocated then.
     ValueError
@@ -187,7 +193,7 @@ def piecewise_distance(
 
 
 def jumps_of(phi: Field[CutSurface], solution: JumpSolution, error: float) -> Jumps:
-    """Return the note on the jumps of a field, and on the objective that it minimises."""
+    """Return the note for the diagnostics of a field on its jumps, its objective and its integration error."""
     return Jumps(
         objective=solution.objective,
         bound=solution.bound,
@@ -201,7 +207,7 @@ def jumps_of(phi: Field[CutSurface], solution: JumpSolution, error: float) -> Ju
 
 
 def memory_estimate(n_triangles: int) -> float:
-    """Return the most bytes that a field on so many triangles takes, without those of libraries."""
+    """Estimate the peak memory, in bytes, that a field on `n_triangles` triangles needs besides libraries."""
     per_triangle, per_doubling = BYTES_WITH_JUMPS[chosen_backend()]
     return n_triangles * (per_triangle + per_doubling * math.log2(max(n_triangles, 2)))
 
@@ -211,7 +217,10 @@ def _retriangulated(
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]],
     intrinsic: bool | Literal["auto"],
 ) -> tuple[TriangleMesh | PolygonMesh | IntrinsicTriangulation, SurfaceDiscretization]:
-    """Return the domain, or the intrinsic triangulation of it that bad triangles or unoriented curves need."""
+    """Return the domain on which the field will lie, and its discretisation.
+
+    It is the given domain, or an intrinsic triangulation of it if bad triangles or unoriented curves need one.
+    """
     discretization = _lowered(domain)
     if isinstance(domain, IntrinsicTriangulation):
         return domain, conforming(discretization, sources)
@@ -236,7 +245,7 @@ def _retriangulated(
 
 
 def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation) -> SurfaceDiscretization:
-    """Return the discretisation, if there is memory for the field; factors are made for one diffusion time only."""
+    """Return the discretisation of a domain; raise `MemoryLimitError` if there is not enough memory for the field."""
     n = len(domain.corners) if isinstance(domain, PolygonMesh) else domain.n_faces
     refuse_beyond_memory(
         f"piecewise distance on {n:,} triangles", n, memory_estimate, lambda number: f"use at most {number:,} triangles"
@@ -247,7 +256,7 @@ def _lowered(domain: TriangleMesh | PolygonMesh | IntrinsicTriangulation) -> Sur
 
 
 def conforms(discretization: SurfaceDiscretization, sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]]) -> bool:
-    """Whether the triangles conform to all sources, so that `adapt` does not refine them."""
+    """Whether unoriented curves run along edges of the triangles, so that `adapt` does not refine these."""
     adapted = discretization.adapt(sources)[0].triangles
     return adapted.corner_vertices is discretization.triangles.corner_vertices
 
@@ -265,13 +274,20 @@ def conforming(
 
 
 def corner_slopes(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
-    """(m, 3) ``Y_f · (q_k − centroid)``: φ at the corners if it is zero at the centroid (constraint of Eq. 16)."""
+    """Return (m, 3) values at the corners of faces of functions with gradient Y that are zero at centroids (Eq. 16).
+
+    `directions` are Y as complex numbers in the planar layout of each face, (m,).
+    """
     centroid = triangles.corner_positions.mean(axis=1, keepdims=True)
     return (np.conj(directions)[:, None] * (triangles.corner_positions - centroid)).real
 
 
 def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, guarded: Bools) -> JumpProblem:
-    """Return the objective of Eq. 16: unknowns are one constant per face, and weights have the curl κ of Eq. 15."""
+    """Return the minimisation problem of Eq. 16, with one unknown constant per face and the weights of Eq. 15.
+
+    `slopes` are those of `corner_slopes`, (m, 3). Edges where `guarded`, (e,), is true get `SOURCE_CUT` times the
+    weight.
+    """
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
     spread = np.abs(offsets[:, 1] - offsets[:, 0])  # κ |e|, whatever the constants are
@@ -288,7 +304,7 @@ def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, gua
 
 
 def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Bools:
-    """(e,) edges with an end on the source, and edges of faces that it crosses."""
+    """Return (e,) bool, true for edges with an end on the source or on a face that the source crosses."""
     touched = np.zeros(triangles.n_vertices, dtype=bool)
     for part in parts:
         touched[part.nodes.elements[part.nodes.kinds == VERTEX]] = True
@@ -299,7 +315,10 @@ def guarded_edges(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> B
 
 
 def centered(triangles: IntrinsicMesh, values: Floats, parts: Sequence[CurveSegments]) -> Floats:
-    """Return values less their median, by length, over the source in each component; NaN where there is no source."""
+    """Shift (m, 3) values so that their median over the source is zero on each connected component of the surface.
+
+    The median is weighted by length. Values are NaN on components without a source.
+    """
     label = triangles.face_components
     faces, heights, weights = [], [], []
     for part in parts:

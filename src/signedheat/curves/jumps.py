@@ -29,10 +29,11 @@ from ..surfaces.cotan import cotan_matrix, divergence
 from .cut_surface import CutSurface
 
 DUALITY_GAP, MOST_SPLITTING_ROUNDS = 2e-3, 3000
-"""Relative gap between objective and bound at which minimisation ends, and the largest number of its rounds."""
+"""Relative gap between objective and lower bound below which minimisation ends, and the largest number of rounds, after
+which it ends in any case."""
 LOOSE_GAP = 0.15
-"""Below this gap it is checked whether constants leave a cut: if not, minimisation ends, since the remaining jumps are
-smaller than triangles."""
+"""Relative gap below which minimisation ends early if φ has no cut. The remaining jumps are then smaller than
+triangles."""
 ROUNDS_PER_LOOK = 25
 """Rounds between two evaluations of the gap."""
 THRESHOLD_GROWTH, GROWTH_ROUNDS = 2.0, 250
@@ -42,11 +43,10 @@ spheres."""
 
 @dataclass(frozen=True, eq=False)
 class JumpProblem:
-    """Minimise ``floor + Σ 2w dist(c_f − c_g, [a, b])`` over one constant c per face."""
+    """Minimise ``floor + Σ 2w dist(c_f − c_g, [a, b])`` over one constant c per face, summed over pairs of faces."""
 
-    faces: Ints  # (p, 2) the faces f and g of each pair
-    # (p,) a and b, a ≤ b: the differences c_f − c_g that make φ continuous at one end of the edge, and at the
-    # other
+    faces: Ints  # (p, 2) ids of the faces f and g of each pair
+    # (p,) a and b, a ≤ b. These values of c_f − c_g make φ continuous at one and at the other end of the edge
     low: Floats
     high: Floats
     weights: Floats  # (p,) w, positive
@@ -54,11 +54,11 @@ class JumpProblem:
     floor: float = 0.0  # the cost that does not depend on the constants
 
     def differences(self, constants: Floats) -> Floats:
-        """x = K c: (p,) constants of the first faces minus those of the second."""
+        """Return (p,) constants of the first face of each pair minus those of the second; K c in the notes above."""
         return constants[self.faces[:, 0]] - constants[self.faces[:, 1]]
 
     def objective(self, constants: Floats) -> float:
-        """Return the value to be minimised."""
+        """Return the value of the objective for (n_faces,) constants."""
         difference = self.differences(constants)
         return self.floor + 2.0 * float(self.weights @ np.abs(difference - np.clip(difference, self.low, self.high)))
 
@@ -69,7 +69,7 @@ class JumpProblem:
 
     @property
     def scale(self) -> float:
-        """Typical size of a and b."""
+        """Mean absolute value of a and b."""
         return 0.5 * float(np.mean(np.abs(self.low) + np.abs(self.high)))
 
     def incidence(self) -> sparse.csr_matrix:
@@ -81,7 +81,7 @@ class JumpProblem:
 
 @dataclass(frozen=True, eq=False)
 class JumpSolution:
-    """Constants, with a certificate of their quality."""
+    """Constants that nearly minimise a `JumpProblem`, with a lower bound that certifies them."""
 
     constants: Floats  # (n_faces,) c; on each connected component of the surface up to a constant
     objective: float  # the objective at these constants
@@ -99,9 +99,10 @@ def minimize(
     progress: Progress | None = None,
     enough: Callable[[Floats], bool] | None = None,
 ) -> JumpSolution:
-    """Minimise ``Σ 2w dist(z, [a, b])`` with z = K c by ADMM until the gap is certified, or constants are `enough`.
+    """Solve a `JumpProblem` by ADMM, splitting z = K c, until the relative gap is below `DUALITY_GAP`.
 
-    Penalties proportional to w give all edges the same threshold, which can grow without a new factorisation.
+    It also ends below `LOOSE_GAP` if ``enough(constants)`` is true, and after `MOST_SPLITTING_ROUNDS`. Penalties
+    proportional to w give all edges the same threshold, which can grow without a new factorisation.
     """
     if not len(problem.faces):
         return JumpSolution(np.zeros(problem.n_faces), problem.floor, problem.floor, 0)
@@ -119,10 +120,12 @@ def minimize(
         negligible = 1e-9 * threshold * problem.weights.sum()
 
         def proximal(target: Floats) -> Floats:
+            """Move (p,) differences towards the interval [a, b], by the threshold at most."""
             excess = target - np.clip(target, low, high)
             return target - np.clip(excess, -threshold, threshold)
 
         def solve(target: Floats) -> Floats:
+            """Return the constants whose differences are nearest to a (p,) target, weighted by `spring`."""
             return factor.solve(transposed @ (spring * target))
 
         steps, rounds = split_rounds(proximal, solve, problem.differences, step, step), 0
@@ -147,9 +150,10 @@ def minimize(
 
 
 def regions_moved(problem: JumpProblem, constants: Floats) -> Floats:
-    """Return constants after regions between cuts, smallest first, have joined a neighbour at no higher cost.
+    """Improve (n_faces,) constants by shifting whole regions between cuts, the smallest first.
 
-    Each is shifted by the weighted median of the shifts that make φ continuous at an end of an edge around it.
+    A region consists of faces connected by jumps of at most ``problem.scale``. It is shifted by the weighted median of
+    the shifts that make φ continuous at an end of an edge around it, which does not increase the objective.
     """
     constants = constants.copy()
     for _ in range(problem.n_faces):  # each round leaves one region less
@@ -176,7 +180,11 @@ def regions_moved(problem: JumpProblem, constants: Floats) -> Floats:
 def _lags(
     spring: Floats, difference: Floats, low: Floats, high: Floats, z: Floats, before: Floats, scaled: Floats
 ) -> bool:
-    """Whether the multipliers converge slowly: the relative dual residual is more than twice the primal one."""
+    """Whether multipliers of ADMM converge too slowly, with a relative dual residual more than twice the primal one.
+
+    All arrays are (p,): the penalties `spring`, the differences K c, the ends of the intervals, the split variable z
+    now and one round `before`, and the `scaled` multipliers.
+    """
     primal = np.sqrt(spring @ (difference - z) ** 2)
     jumps = np.sqrt(spring @ (difference - np.clip(difference, low, high)) ** 2)
     dual = np.sqrt(spring @ (z - before) ** 2)
@@ -184,7 +192,10 @@ def _lags(
 
 
 def _grounded_laplacian(incidence: sparse.csr_matrix, spring: Floats) -> sparse.csr_matrix:
-    """``KᵀSK``, S the diagonal matrix `spring`, with one face of each connected component grounded."""
+    """Return ``KᵀSK`` for K the `incidence` and S = diag(spring), made regular.
+
+    On each connected component, 1 is added to the diagonal entry of one face.
+    """
     laplacian = sparse.csr_matrix(incidence.T @ sparse.diags_array(spring) @ incidence)
     parts = sparse.csgraph.connected_components(laplacian, directed=False)[1]
     held = np.zeros(laplacian.shape[0])
@@ -193,24 +204,27 @@ def _grounded_laplacian(incidence: sparse.csr_matrix, spring: Floats) -> sparse.
 
 
 LEAST_JUMP = 3.0
-"""The largest jump on a cut is at least this many times the longest side of a typical triangle."""
+"""Least size of the largest jump on a line of a cut, relative to `typical_size`. Lines with lower jumps are no cut."""
 
 LEAST_BRANCH_JUMP = 5.0
-"""The largest jump on a branch of a cut is at least this many times that side, or half of the largest on the cut. Where
-directions turn within several triangles, there are lower jumps."""
+"""Least size of the largest jump on a branch of a cut, relative to `typical_size`, or half of the largest jump on the
+cut if that is less. Branches with lower jumps are no cut. They occur where Y turns within several triangles."""
 
 SMOOTHED_WIDTH = 10.0
-"""w in `smoothed`, relative to the square root of the area of a part: the result is that of step 3 to a thousandth. If
-w were larger, rounding would remove M."""
+"""The length w in `smoothed`, relative to the square root of the area of a connected part. The result then differs from
+that of step 3 by a thousandth. If w were much larger, M would be lost in rounding."""
 
 
 def typical_size(triangles: IntrinsicMesh) -> float:
-    """Return the longest side of a typical triangle."""
+    """Return the mean of the longest sides of triangles, weighted by area."""
     return float(np.average(triangles.edge_lengths.max(axis=1), weights=triangles.face_areas))
 
 
 def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bools:
-    """(p,) whether (m, 3) values at corners jump between faces of each pair, along a line, by more than errors do."""
+    """Return (p,) bool, true for pairs of faces between which (m, 3) corner values jump by more than errors do.
+
+    Such jumps form lines, whose largest jump is at least `LEAST_JUMP`, and without branches below `LEAST_BRANCH_JUMP`.
+    """
     longest, typical = triangles.edge_lengths.max(axis=1), typical_size(triangles)
     height = np.abs(pairs.ends(values)).max(axis=1)
     high = np.flatnonzero(height > np.maximum(longest[pairs.faces].max(axis=1), typical))
@@ -227,7 +241,9 @@ def high_jumps(triangles: IntrinsicMesh, pairs: FacePairs, values: Floats) -> Bo
 
 
 def without_twigs(edges: Ints, high: Bools) -> Bools:
-    """(k,) which of (k, 2) edges remain if lines between ends and forks without any `high` edge, (k,), are removed.
+    """Return (k,) bool, true for the (k, 2) edges that remain after twigs are removed.
+
+    A twig is a chain of edges between ends and forks, none of which is `high`, (k,).
 
     Examples
     --------
@@ -249,7 +265,11 @@ def without_twigs(edges: Ints, high: Bools) -> Bools:
 def is_continuous(
     triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, directions: Complexes, constants: Floats
 ) -> bool:
-    """Whether the constants of the faces leave no cut, neither as a line nor spread over many small jumps."""
+    """Whether φ with these constants of the faces has no cut.
+
+    A cut would be a line of large jumps, or a strip of small jumps in which gradients of the averaged φ differ from Y.
+    `slopes` and `constants`, (m, 3) and (m,), add up to φ at the corners. `directions` are Y, (m,).
+    """
     values = slopes + constants[:, None]
     if np.abs(pairs.ends(values)).max(initial=0.0) > LEAST_JUMP * typical_size(triangles):
         return False
@@ -264,15 +284,16 @@ def is_continuous(
 
 
 def gradients(triangles: IntrinsicMesh, at_corners: Floats) -> Complexes:
-    """(m,) gradients of functions that are linear in every face, in its layout."""
+    """Return (m,) gradients of a function with (m, 3) corner values, complex numbers in each face's planar layout."""
     opposite = 1j * np.roll(triangles.edge_vectors, -1, axis=1)
     return (at_corners * opposite).sum(axis=1) / (2.0 * triangles.areas_as_divisors)
 
 
 def smoothed(triangles: IntrinsicMesh, pairs: FacePairs, directions: Complexes, rough: Floats, cut: Bools) -> Floats:
-    """(m, 3) values on the surface cut open: step 3 (Eq. 13), with constants of φ₀: ``(M + w² C) φ = M φ₀ + w² b``.
+    """Make φ continuous on the surface cut open, by step 3 of the method (Eq. 13); return its (m, 3) corner values.
 
-    Shapes: `directions` Y (m,), `rough` φ₀ (m, 3) at the corners of the triangles, `cut` (p,) of the `pairs`.
+    Solves ``(M + w² C) φ = M φ₀ + w² b``, so that φ has the mean of φ₀ on each connected part. `directions` are Y,
+    (m,), `rough` is φ₀ at the corners, (m, 3), and `cut`, (p,), is true for the `pairs` that the cut separates.
     """
     opened = cut_open(triangles, pairs, cut)
     owner = opened.corner_vertices.ravel()
@@ -287,19 +308,19 @@ def smoothed(triangles: IntrinsicMesh, pairs: FacePairs, directions: Complexes, 
 
 
 def slope_error(triangles: IntrinsicMesh, at_corners: Floats, directions: Complexes) -> float:
-    """Root mean square of ∇φ − Y, where φ is known."""
+    """Return the root mean square of ∇φ − Y over the faces in which the (m, 3) corner values of φ are not NaN."""
     finite = ~np.isnan(at_corners[:, 0])
     error = np.abs(gradients(triangles, at_corners) - directions)
     return float(np.sqrt(np.average(error[finite] ** 2, weights=triangles.face_areas[finite])))
 
 
 def integration_error(phi: Field[CutSurface], directions: Complexes) -> float:
-    """Root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the split surface."""
+    """Return the root mean square of ∇φ̄ − Y, where φ̄ averages φ over the corners at each vertex of the cut surface."""
     at_corners = phi.domain.means(phi.values)[phi.domain.split_vertices[0]]
     return slope_error(phi.domain.triangles, at_corners.reshape(-1, 3), directions)
 
 
 def cut_open(triangles: IntrinsicMesh, pairs: FacePairs, cut: Bools) -> IntrinsicMesh:
-    """Return the triangles with vertices doubled along a cut."""
+    """Return the triangles with vertices doubled along the cut, which is true for some of the `pairs`, (p,)."""
     owner = split_corners(triangles, pairs, cut)
     return replace(triangles, corner_vertices=owner.reshape(-1, 3), n_vertices=int(owner.max(initial=-1)) + 1)

@@ -1,4 +1,4 @@
-"""Outlines in the plane: lines that go on in each other until they close, and what closed outlines fill."""
+"""Closed outlines in the plane, made of lines that join end to end, and the regions that they fill."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..mesh.welding import ONE_PLACE
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutlinesFilled(Note):
-    """How closed outlines were filled: by which rule, how many, and which share of their length lies inside."""
+    """Note on filled outlines: the rule, their number, and the fraction of their length that lies inside the region."""
 
     rule: str
     outlines: int
@@ -36,10 +36,11 @@ class OutlinesFilled(Note):
 def outlines_filled(
     lines: Sequence[Polyline], rule: FillRule, narrow: float
 ) -> tuple[list[Polyline], list[int], OutlinesFilled | None]:
-    """Return the outlines of what closed lines fill, then lines that are not closed; and a note if any are filled.
+    """Replace closed lines by the outlines of the region that they fill; return these first, then the open lines.
 
-    Also return numbers to name these by: open lines keep theirs, and outlines have those of closed lines, in order, or
-    higher ones if there are more of them. Lines that close together (`closed_together`) count as one closed line.
+    Open lines that close together (`closed_together`) count as a closed line; `narrow` is passed on. The second result
+    has a number for each line, for messages: open lines keep theirs, and outlines get those of closed lines, or higher
+    ones if there are more outlines. The third is a note, None if no outline is filled.
     """
     outlines = {k: line for k, line in enumerate(lines) if line.closed}
     strokes = distinct({k: line for k, line in enumerate(lines) if not line.closed})
@@ -57,7 +58,7 @@ def outlines_filled(
 
 
 def distinct(strokes: dict[int, Polyline]) -> dict[int, Polyline]:
-    """Return strokes without copies of others, which run either way."""
+    """Return strokes, keyed by number, without those that have the same points as an earlier one in either order."""
     first: dict[bytes, int] = {}
     for k, line in strokes.items():
         first.setdefault(min((line.points + 0.0).tobytes(), (line.points[::-1] + 0.0).tobytes()), k)
@@ -65,12 +66,12 @@ def distinct(strokes: dict[int, Polyline]) -> dict[int, Polyline]:
 
 
 def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[tuple[list[int], Polyline]]:
-    """Return the outlines that open lines make where they go on in each other, whichever way each of them runs.
+    """Join open lines end to end, whatever their directions, and return the closed outlines with their lines' numbers.
 
-    Two lines go on in each other if no third one ends there, and their ends differ by rounding, or by less than
-    `narrow`, relative to the length of the shorter one. An outline runs as most of its length does, or, if half runs
-    either way, counter-clockwise. What is not wider than the gaps in it is no outline, but a line drawn twice. Each
-    outline comes with the numbers of its lines.
+    Two lines join if no third line ends there and the distance between their ends is due to rounding or below `narrow`
+    times the length of the shorter line. An outline gets the direction of most of its length, or runs counter-clockwise
+    if half of it has either direction. Outlines that are not wider than the gaps in them are left out, since these are
+    lines drawn twice.
     """
     numbers, lines = list(strokes), list(strokes.values())
     if not lines:
@@ -99,9 +100,10 @@ def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[tuple[l
 
 
 def partners(ends: Floats, room: Floats) -> tuple[Ints, Floats]:
-    """Return (n,) the end that each of (n, 2) ends of lines meets, itself if none or several, and how far away it is.
+    """Pair the ends of lines that meet: return (n,) the index of each end's partner, and (n,) its distance.
 
-    Ends meet that are nearer to each other than the `room` (n,) of both of them.
+    Two of the (n, 2) ends meet if their distance is at most the `room`, (n,), of both. An end that meets none or
+    several others is its own partner.
     """
     n = len(ends)
     distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(3, n))

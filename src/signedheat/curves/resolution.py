@@ -1,4 +1,4 @@
-"""Curves that triangles do not resolve, and the triangles that are made for them."""
+"""Finer triangles for curves that the triangles of a mesh do not resolve."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.triangle_mesh import TriangleMesh
 
 SHORT_CURVE = 16.0
-"""Curves that are shorter than this, in h, with all of their pieces, get triangles of their own."""
+"""Length of a curve with all its pieces, in spacings h of the mesh, below which finer triangles are made for it."""
 
 Surface = TypeVar("Surface", bound=SurfaceDomain)
 Found = TypeVar("Found")
@@ -33,7 +33,12 @@ def on_resolving_triangles(
     curves: CurvesAndPoints,
     always: bool = False,
 ) -> Found:
-    """Return what is measured on triangles that resolve the curves: those of the mesh, or smaller ones where needed."""
+    """Call ``measure(solver)`` with a solver whose triangles resolve the curves, and return its result.
+
+    That is the given solver, unless curves on a triangle mesh are small (`are_small`), their normals cancel, or
+    `always` is true. Then it is one with an intrinsic triangulation made for the curves. If that fails for small
+    curves, it is the given solver after all.
+    """
     mesh = solver.domain
     if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
         try:
@@ -49,7 +54,7 @@ def on_resolving_triangles(
 
 
 def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
-    """Whether oriented curves, or the pieces of one of them, are so short that triangles do not resolve them."""
+    """Whether all oriented curves together, or the pieces of one curve, are shorter than `SHORT_CURVE` spacings."""
     surface, listed = surface_of(solver), flattened(curves)
     parts = chain.from_iterable(surface.segments(listed))  # refuses curves that do not fit
     lengths = [float(part.lengths.sum()) for part in parts if part.oriented]
@@ -60,7 +65,10 @@ def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
 
 
 def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
-    """Return the solver with the triangles that it makes for all curves, which it then also uses for some of them."""
+    """Return a solver that uses the triangulation for all of the curves for any subset of them, too.
+
+    A solver that does not make a triangulation for every set of sources is returned as it is.
+    """
     made = solver.discretization
     if not isinstance(made, Retriangulated):
         return solver
@@ -68,7 +76,10 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
-    """Return the discretisation that the solver uses for all sources, or else that of its domain."""
+    """Return the surface discretisation of the solver, or of its domain if the solver makes one for every source.
+
+    Raises `SourceError` if the domain is no surface.
+    """
     made = solver.discretization
     surface = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
     if not isinstance(surface, SurfaceDiscretization):
@@ -78,7 +89,7 @@ def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
 
 
 def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
-    """Return the curves and points, without the groups that they were given in."""
+    """Return curves and points as a flat list, without nested groups."""
     listed: list[CurveOrPoints | Sequence[CurveOrPoints]] = as_list(curves)
     return list(chain.from_iterable(c if isinstance(c, Sequence) and not isinstance(c, str) else [c] for c in listed))
 
@@ -86,6 +97,6 @@ def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
 def for_zero_set(
     mesh: TriangleMesh, diffusion: Diffusion | None, progress: Progress | None = None
 ) -> SignedHeatSolver[TriangleMesh]:
-    """Return a solver with ``intrinsic=True`` and diffusion times that suit the pieces, however small they are."""
+    """Return a solver with ``intrinsic=True`` whose triangulations suit the zero set of φ, even for tiny curves."""
     solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
     return with_discretization(solver, RetriangulatedForZeroSet(mesh, within(progress, 0.2, 0.4)))

@@ -1,4 +1,4 @@
-"""Which way strokes run, and which of them bound something: the directions of least energy."""
+"""Directions of strokes with the least energy, so that together they bound something, and the strokes to leave out."""
 
 from __future__ import annotations
 
@@ -29,49 +29,54 @@ from .resolution import flattened, on_resolving_triangles, surface_of, triangula
 from .strokes import EQUAL_COSTS, EXPLAINED, Inside, Strokes
 
 TIE = 0.05
-"""A later reading must cost less than an earlier one by more than this share. Halved or left out, none of 88 drawings
-changes; doubled, one does."""
+"""Share by which directions of strokes must cost less than earlier ones to be preferred. Halved or left out, none of 88
+drawings changes; doubled, one does."""
 MISSING = 2.0
-"""Share of the length of the strokes from which on what is unexplained makes the inside a guess."""
+"""Unexplained length, relative to the length of all strokes, above which the curves are said to bound nothing."""
 TURNING_COST = 0.6
-"""Cost of turning a stroke, relative to its length: less than of leaving it out. At 0.5, of three loops side by side
-one is turned; from 0.7 on, of nine small circles those are not turned that contradict the others."""
+"""Cost of flipping a stroke, relative to its length. It is less than the cost 1 of leaving it out. At 0.5, one of three
+loops side by side is flipped; from 0.7 on, of nine small circles those that contradict the others are not flipped."""
 WEAK_TURNING_COST = 0.02
-"""Cost of turning a stroke of mean length in `smooth_signs`. If two follow each other, with a gap of half of their
-length, the energy is less by 0.05. Halved and doubled, none of 46 drawings changes."""
+"""Cost of flipping a stroke of mean length in `smooth_signs`. For comparison, the energy is less by 0.05 if two strokes
+follow each other with a gap of half their length. Halved and doubled, none of 46 drawings changes."""
 TRIED_SINGLY = 16
-"""Number of strokes, the longest first, that are turned or left out one by one where they explain nothing; limited for
-speed. Halved and doubled, none of 46 drawings changes."""
+"""Largest number of strokes, the longest first, that are tried one by one. It is limited for speed. Halved and doubled,
+none of 46 drawings changes."""
 HALF, TURNED = 0.45, 0.34
-"""The inside is a guess if more than the first share of some loops is turned, and that makes up the second share of the
-length. Of 600 drawings with turned parts (`benchmarks/strokes.py`, seeds 20000 to 20200) 6 are wrong in silence and 29
-right with a warning; the first at 0.49 7 and 25, at 0.4 4 and 37, at 0.37 4 and 48; the second at 0.25 3 and 43, at 0.3
-5 and 31. Above a half, two halves of a circle that contradict each other would be no guess if a dot decides."""
+"""There is a warning if more than the first share of some loops is flipped, and these flipped strokes make up more than
+the second share of the length. Of 600 drawings with flipped parts (`benchmarks/strokes.py`, seeds 20000 to 20200) 6 are
+wrong without a warning and 29 right with one. With the first at 0.49 these are 7 and 25, at 0.4 4 and 37, at 0.37 4 and
+48; with the second at 0.25 3 and 43, at 0.3 5 and 31. Above a half there would be no warning where a dot decides
+between two halves of a circle that contradict each other."""
 WORTH = 0.5
-"""The inside is a guess if it depends on a stroke worth less than this, relative to its length. At 0.4, 6 of these 600
-drawings are wrong in silence and 15 right with a warning; halved 8 and 15, at 0.6 5 and 22."""
+"""Worth of a stroke (`Decision.worth_little`), relative to its length, below which there is a warning if the inside
+depends on it. At 0.4, 6 of these 600 drawings are wrong without a warning and 15 right with one; halved 8 and 15, at
+0.6 5 and 22."""
 CHANGED_AREA = 0.05
-"""The inside depends on a stroke if this share of the area changes sides without it. Halved, 5 of these 600 drawings
-are wrong in silence and 23 right with a warning; doubled, 9 and 15."""
+"""Share of the area above which the inside depends on a stroke, if so much changes sides without it. Halved, 5 of these
+600 drawings are wrong without a warning and 23 right with one; doubled, 9 and 15."""
 
 
 @dataclass(frozen=True, eq=False)
 class CurvePieces:
-    """Oriented curves on a surface, as strokes.
+    """Oriented curves on a surface, joined into k strokes.
 
-    Curves that go on in each other, head to tail, are one stroke. Strokes are ordered by place, so that nothing depends
-    on how curves are numbered.
+    Curves that continue each other, head to tail, are one stroke. Strokes are sorted by position, so that nothing
+    depends on the order of the curves.
     """
 
-    numbers: Ints  # (j,) which of the curves given are oriented, ordered by place
+    numbers: Ints  # (j,) indices of the oriented curves among those given, sorted by position
     stroke: Ints  # (j,) the stroke that each of these is part of
-    movable: Bools  # (k,) whether each stroke may be turned
-    is_piece: Bools  # (k,) whether it ends inside the surface
+    movable: Bools  # (k,) whether each stroke may be flipped
+    is_piece: Bools  # (k,) whether each stroke ends inside the surface
     strokes: Strokes  # the strokes, and the energy of the sets that they may bound
 
     @classmethod
     def of(cls, surface: SurfaceDiscretization, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
-        """Return the oriented curves as strokes; None if there is nothing to decide about them."""
+        """Join oriented curves into strokes.
+
+        Returns None if no stroke may be flipped, or if there is a single one without free ends.
+        """
         numbers = [k for k, c in enumerate(curves) if isinstance(c, Curve) and c.oriented]
         listed = [cast("Curve", curves[k]) for k in numbers]
         if not listed:
@@ -98,47 +103,47 @@ class CurvePieces:
         return cls(np.array(numbers, dtype=np.int64)[order], stroke[copy], movable, is_piece, strokes)
 
     def curves(self, chosen: Bools) -> Ints:
-        """Numbers of the curves that make up the strokes chosen by (k,) bool."""
+        """Return the sorted indices of the given curves that make up the strokes chosen by (k,) bool."""
         return np.sort(self.numbers[chosen[self.stroke]])
 
 
 @dataclass(frozen=True, eq=False)
 class Decision:
-    """The reading of curves that leaves the least length unexplained."""
+    """Directions of strokes that cost least, with the questions whether they may be trusted."""
 
     pieces: CurvePieces  # the curves
-    reading: Inside  # the directions of strokes, 0 where they are left out, and the sides by heat
-    tied: bool = False  # whether another reading, which leaves as little unexplained, has something else inside
+    reading: Inside  # the directions of strokes, 0 where they are left out, and the sides of vertices by heat
+    tied: bool = False  # whether other directions that cost as little have another inside
 
     @cached_property
     def best(self) -> Inside:
-        """The sides of shortest boundary for the same directions."""
+        """The inside with the shortest boundary for the same directions of strokes."""
         return self.pieces.strokes.inside(self.reading.signs)
 
     def turned(self, n: int) -> Bools:
-        """(n,) which of all curves given are turned."""
+        """Return (n,) bool, true for those of all n given curves that are flipped."""
         return mask_of(n, self.pieces.curves(self.reading.signs < 0))
 
     @property
     def loose(self) -> Bools:
-        """(k,) which strokes are left out."""
+        """Whether each stroke is left out, (k,) bool."""
         return np.asarray(self.reading.signs == 0)
 
     @property
     def bounds_nothing(self) -> bool:
-        """Whether far more of the curves is missing than there is."""
+        """Whether the unexplained length exceeds `MISSING` times the length of the strokes."""
         return self.pieces.strokes.unexplained(self.reading) > MISSING * float(self.pieces.strokes.lengths.sum())
 
     def loops_left_out(self) -> Ints:
-        """Return the numbers of curves of loops that bound nothing, but would bound something without the others."""
+        """Return the indices of given curves in loops that were left out, but would bound something on their own."""
         strokes = self.pieces.strokes
-        found = np.zeros(len(self.loose), dtype=bool)
+        bounding = np.zeros(len(self.loose), dtype=bool)
         for group in np.flatnonzero(strokes.whole_loops(self.loose)).tolist():
             in_loop = strokes.group == group
             alone = strokes.inside(np.where(in_loop, 1.0, 0.0))
             if (alone.explained[in_loop] >= EXPLAINED).any():
-                found |= in_loop
-        return self.pieces.curves(found)
+                bounding |= in_loop
+        return self.pieces.curves(bounding)
 
     @property
     def all_bound(self) -> bool:
@@ -146,20 +151,25 @@ class Decision:
         return not self.bounds_nothing and bool((self.best.explained[~self.loose] >= EXPLAINED).all())
 
     def turned_loops(self) -> Ints:
-        """Return the numbers of turned curves in loops of which about half or more is turned; none if these are few."""
+        """Return the indices of flipped curves in loops of which about half or more is flipped.
+
+        None are returned if they are shorter than the share `TURNED` of themselves and the strokes that are not
+        flipped.
+        """
         strokes, best = self.pieces.strokes, self.best
         lengths = np.where(best.explained >= EXPLAINED, strokes.lengths, 0.0)
         turned, total = (np.bincount(strokes.group, lengths * way) for way in (best.signs < 0, 1))
         against = (turned > HALF * total)[strokes.group] & (best.signs < 0) & (lengths > 0)
-        # other strokes that are turned count for neither side: they are no evidence of what is right
+        # other strokes that are flipped count for neither side, since they are no evidence of what is right
         few = lengths[against].sum() < TURNED * lengths[against | (best.signs > 0)].sum()
         return self.pieces.curves(against & (not few))
 
     def worth_little(self) -> Ints:
-        """Return the numbers of curves on which the inside depends, although they are worth little.
+        """Return the indices of curves on which the inside depends, although they are worth little.
 
-        A stroke is worth what more is unexplained without it: a piece of a curve, what it closes and its length; an arc
-        alone, its length less that of its gap; a stray stroke little, because a line is added for it.
+        The worth of a stroke is the increase of the unexplained length if it is left out. A piece of a curve is worth
+        its length and that of the gap it fills. A single arc is worth its length less that of its gap. A stray stroke
+        is worth little, since the boundary has to make a detour to it.
         """
         strokes, reading = self.pieces.strokes, self.reading
         missing = strokes.unexplained(reading)  # a stroke is worth its length less this, or more
@@ -175,7 +185,10 @@ class Decision:
 
 
 def order_in_space(places: Sequence[Floats]) -> Ints:
-    """Return (k,) the order of curves, each (j, 3) points, by mean and first point, however numbered and scaled."""
+    """Return (k,) indices that sort curves, each (j, 3) points, by their mean point and then by their first point.
+
+    Coordinates that differ by rounding, relative to the size of all curves, count as equal.
+    """
     keys = np.array([[*points.mean(axis=0), *points[0]] for points in places])
     low = np.minimum(keys[:, :3].min(axis=0), keys[:, 3:].min(axis=0))
     size = max(float((keys - np.tile(low, 2)).max()), np.finfo(float).tiny)
@@ -183,7 +196,11 @@ def order_in_space(places: Sequence[Floats]) -> Ints:
 
 
 def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
-    """Return (k,) the likely curve of each stroke, and (g,) lengths of their gaps; from (2 j, 3) ends of curves."""
+    """Group k strokes to g likely curves, by joining each end of a curve to the nearest other end.
+
+    `ends` are the first and last points of j curves in turn, (2 j, 3), and `stroke` is the stroke of each curve, (j,).
+    Returns (k,) the likely curve of each stroke, and (g,) the total length of the gaps in each likely curve.
+    """
     j = len(stroke)
     nearest = nearest_others(ends)
     tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
@@ -194,12 +211,16 @@ def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
 
 
 def is_whole(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
-    """Whether a stroke is closed, or goes from boundary to boundary of the surface."""
+    """Whether a stroke is closed, or has both ends on the boundary of the surface."""
     return is_closed(part) or _ends_on(triangles, part, triangles.edges.face_counts == 1)
 
 
 def may_turn(triangles: IntrinsicMesh, part: CurveSegments) -> bool:
-    """Whether a direction means something: at an edge of three faces one in one of them says nothing of the others."""
+    """Whether a stroke may be flipped.
+
+    One that goes from one edge of three or more faces to another may not, since in one of the faces its direction says
+    nothing about the others.
+    """
     return is_whole(triangles, part) or not _ends_on(triangles, part, triangles.edges.face_counts != 2)
 
 
@@ -209,14 +230,14 @@ def is_closed(part: CurveSegments) -> bool:
 
 
 def _ends_on(triangles: IntrinsicMesh, part: CurveSegments, is_edge: Bools) -> bool:
-    """Whether both ends of a stroke lie on some edges, (e,)."""
+    """Whether both ends of a stroke lie on edges for which `is_edge`, (e,), is true."""
     on = mask_of(triangles.n_vertices, triangles.edges.vertices[is_edge])
     ends = interpolation_at(triangles, part.nodes[part.ends[[0, -1], [0, 1]]])
     return all(bool(on[ends[end].indices].all()) for end in (0, 1))
 
 
 def bound_as_given(pieces: CurvePieces) -> bool:
-    """Whether strokes without ends, as they are given, have one side each, and the other, all along."""
+    """Whether strokes are all without free ends, and in their given directions separate left from right all along."""
     strokes = pieces.strokes
     if pieces.is_piece.any():
         return False
@@ -226,10 +247,10 @@ def bound_as_given(pieces: CurvePieces) -> bool:
 
 
 def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
-    """Return the reading of strokes that costs least by heat: as given, turned, or with some of them left out.
+    """Choose the directions of strokes: as given, with some flipped, or with some left out.
 
-    As given is the first, and is taken if no other costs clearly less. One comparison is made between all of them, by
-    the length that each leaves unexplained and the `cost` of turning. `every_piece` leaves none out.
+    Candidates are compared by their `cost`, with sides computed by heat. The given directions win unless another
+    candidate costs less by more than the share `TIE`. If `every_piece`, no stroke is left out.
     """
     strokes, movable = pieces.strokes, pieces.movable
     given = strokes.by_heat(np.ones(len(movable)))
@@ -237,10 +258,10 @@ def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
         return Decision(pieces, given)
     smooth = np.where(movable, smooth_signs(strokes, movable), 1.0)
     rivals = cheapest(strokes, movable, smooth)
-    tried = [rivals[0].signs, smooth]
+    candidates = [rivals[0].signs, smooth]
     if not every_piece:
-        tried.append(without_loose(rivals[0], movable))
-    reading = least_of(strokes, [given, *(strokes.by_heat(signs) for signs in tried if signs.any())], TIE)
+        candidates.append(without_loose(rivals[0], movable))
+    reading = least_of(strokes, [given, *(strokes.by_heat(signs) for signs in candidates if signs.any())], TIE)
     if reading is given:
         return Decision(pieces, given)
     apart = [strokes.either_way(rivals[0]), *(strokes.changed_share(rival, rivals[0]) for rival in rivals)]
@@ -248,14 +269,15 @@ def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
 
 
 def without_loose(inside: Inside, movable: Bools) -> Floats:
-    """(k,) directions of strokes, 0 for those that bound nothing."""
+    """Return (k,) directions of strokes, with 0 for movable strokes that bound nothing of the inside."""
     return np.where(movable & (inside.explained < EXPLAINED), 0.0, inside.signs)
 
 
 def cheapest(strokes: Strokes, movable: Bools, smooth: Floats) -> list[Inside]:
-    """Return all insides found that cost least, those for which fewer strokes are turned first.
+    """Search for directions of strokes that cost least, and return all insides of that cost.
 
-    Cuts and directions are improved in turn, from the given and the `smooth` directions; only movable strokes turn.
+    The search starts from the given and the `smooth` directions, (k,), and flips movable strokes only. The insides are
+    sorted by the number of flipped strokes.
     """
     best = least_of(strokes, settled_from(strokes, [np.ones(len(movable)), smooth], movable))
     while True:
@@ -277,39 +299,48 @@ def least_of(strokes: Strokes, insides: list[Inside], share: float = 0.0) -> Ins
 
 
 def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
-    """(k,) the directions of strokes with some of them turned (-1) or left out (0)."""
+    """Return a copy of (k,) directions in which those at the indices `rows` are multiplied by a factor.
+
+    The factor is −1 to flip strokes, and 0 to leave them out.
+    """
     result: Floats = signs.copy()
     result[rows] *= factor
     return result
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
-    """Return the energy and the cost of turning."""
+    """Return the energy of an inside plus the cost of the strokes flipped for it, as a length."""
     return inside.energy + TURNING_COST * float(strokes.lengths[inside.signs < 0].sum())
 
 
 def turnable(strokes: Strokes, inside: Inside, movable: Bools) -> list[list[int]]:
-    """Return lists of strokes to turn together: whole curves, all that bound nothing, and the longest one by one."""
+    """Return lists of the indices of strokes that may be flipped together to lower the cost.
+
+    These are whole likely curves, all strokes that bound nothing, and single strokes among the longest.
+    """
     explained = inside.explained >= EXPLAINED
-    loose, others = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
-    longest = [longest_of(strokes, rows).tolist() for rows in (loose, others)]
+    loose, bounding = np.flatnonzero(movable & ~explained), np.flatnonzero(movable & explained)
+    longest = [longest_of(strokes, rows).tolist() for rows in (loose, bounding)]
     curves = strokes.group[longest[0] + longest[1]]
     together = [np.flatnonzero(movable & (strokes.group == k)).tolist() for k in dict.fromkeys(curves.tolist())]
     return [*together, loose.tolist(), *([k] for k in longest[0] + longest[1])] if len(loose) else together
 
 
 def longest_of(strokes: Strokes, rows: Ints) -> Ints:
-    """Return the `TRIED_SINGLY` longest of some strokes, which are tried one by one."""
+    """Return the indices in `rows` of the longest strokes, `TRIED_SINGLY` at most, the longest first."""
     return rows[np.argsort(-strokes.lengths[rows], kind="stable")[:TRIED_SINGLY]]
 
 
 def settled_from(strokes: Strokes, starts: list[Floats], movable: Bools) -> list[Inside]:
-    """Return what `settled` finds from each start, on all cores."""
+    """Return the result of `settled` for each of the starting directions, computed on all cores."""
     return list(in_threads(lambda signs: settled(strokes, signs, movable), starts))
 
 
 def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
-    """Return sides and directions that fit each other: they are improved in turn until nothing changes."""
+    """Improve the inside and the directions of strokes in turn until nothing changes; return the cheapest inside.
+
+    For given directions, the inside of least energy is computed. Then strokes that bound it the wrong way are flipped.
+    """
     best = inside = strokes.inside(signs)
     for _ in range(20):
         turn = movable & (inside.explained < 0)
@@ -321,7 +352,10 @@ def settled(strokes: Strokes, signs: Floats, movable: Bools) -> Inside:
 
 
 def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
-    """(k,) directions with which smooth sides that jump across the strokes have the least energy (`Strokes.agreed`)."""
+    """Return (k,) directions for which a function that jumps by 1 across all strokes is smoothest (`Strokes.agreed`).
+
+    A small cost keeps given directions where the energy is about the same.
+    """
     agreed, given = strokes.agreed, np.where(movable, WEAK_TURNING_COST, 1e6) * strokes.lengths
     given = given / strokes.lengths.mean()
     weights = np.block([[agreed, given[:, None]], [given[None], np.zeros((1, 1))]])
@@ -331,17 +365,17 @@ def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurveOrientation(Frozen, ShortRepr):
-    """How the parts of a broken curve were oriented.
+    """Directions of the pieces of a broken curve, chosen so that together they bound a region.
 
     Attributes
     ----------
     curves : list of Curve and SurfacePoints
-        All that was given, in order, some curves flipped.
+        The given curves and points, in order, with some curves flipped.
     turned : (k,) bool
-        Which of them were flipped.
+        True for curves that were flipped.
     agreement : (k,) float
-        How much of each bounds what all of them bound together: 1 all of it, 0 nothing, as spurious strokes often do.
-        It is 1 for curves and points that are never flipped.
+        Fraction of each curve that bounds the region, from 0 to 1. Spurious strokes often have 0. It is 1 for points
+        and for curves that are never flipped.
 
     See Also
     --------
@@ -362,17 +396,17 @@ class CurveOrientation(Frozen, ShortRepr):
     agreement: Floats
 
     def agreeing(self, least: float) -> list[CurveOrPoints]:
-        """Return the curves that agree with the others at least that well.
+        """Return the curves whose agreement with the others reaches a threshold.
 
         Parameters
         ----------
         least : float
-            Agreement, from 0 to 1.
+            Least `agreement`, from 0 to 1.
 
         Returns
         -------
         list of Curve or SurfacePoints
-            Those of `curves` with at least this `agreement`.
+            The entries of `curves` with at least this agreement, in order.
 
         See Also
         --------
@@ -393,21 +427,22 @@ class CurveOrientation(Frozen, ShortRepr):
 def curve_orientation(
     curves: CurvesAndPoints | ElementList | Sequence[ElementList], domain: SurfaceDomain | ForeignShape
 ) -> CurveOrientation:
-    """Turn the pieces of broken curves so that together they bound something.
+    """Flip pieces of broken curves so that together they bound a region.
 
-    Directions are taken as given unless others cost less: the length of the boundary of the inside where no piece is,
-    the length of the pieces that do not bound it, and 0.6 of the length that is turned. Where most of the length bounds
-    nothing, as a loop round a torus does not, pieces that follow each other are made to face the same way.
+    Given directions are kept unless others cost less. The cost is the length of the region's boundary where there is no
+    piece, plus the length of the pieces that do not bound it, plus 0.6 of the length that is flipped. Where most of the
+    length bounds nothing, as with a loop around the tube of a torus, pieces that follow each other get the same
+    direction.
 
-    Closed curves are turned like others. Unoriented curves, points, and pieces between edges of three faces or more
-    stay as they are.
+    Closed curves are flipped like others. Unoriented curves, points, and pieces between edges of three or more faces
+    are never flipped.
 
     Parameters
     ----------
     curves : Curve, SurfacePoints, or a sequence of them
-        The pieces, or lists of (element, coordinates), as for `signed_distance`. Those of a group count one by one.
+        The pieces, or lists of (element, barycentric coordinates), as for `signed_distance`. Groups are flattened.
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
-        The surface that they lie on, its faces consistently oriented, or the curves with normals.
+        The surface that they lie on. Its faces are oriented consistently, or the curves have normals.
 
     Raises
     ------
@@ -444,16 +479,19 @@ def curve_orientation(
 
 
 def pieces_for_all(domain: SurfaceDomain, curves: Sequence[CurveOrPoints]) -> CurvePieces | None:
-    """Return the pieces of curves on the triangles of default options, so that options decide nothing about them."""
+    """Return curves as strokes on the triangles of a solver with default options.
 
-    def seen(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:
+    So directions of strokes do not depend on the options of the caller.
+    """
+
+    def strokes_on(solver: SignedHeatSolver[SurfaceDomain]) -> CurvePieces | None:
         return CurvePieces.of(surface_of(triangulated_once(solver, curves)), curves)
 
-    return on_resolving_triangles(seen, SignedHeatSolver(domain), curves)
+    return on_resolving_triangles(strokes_on, SignedHeatSolver(domain), curves)
 
 
 def with_turned(curves: Sequence[CurveOrPoints], turned: Bools) -> list[CurveOrPoints]:
-    """Return the curves, some with their positive side negative."""
+    """Return the curves, flipped where `turned`, (k,), is true; curves with normals get opposite normals instead."""
     return [_turned(curve) if turn else curve for curve, turn in zip(curves, turned, strict=True)]
 
 

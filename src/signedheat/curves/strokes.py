@@ -1,4 +1,8 @@
-"""The energy of the inside that strokes bound, a set of vertices; and the inside of least energy, a minimum cut."""
+"""Regions that strokes on a surface may bound: their energy, and the region of least energy by a minimum cut.
+
+A region is the set of vertices with side 1, called the inside. It is to the left of the strokes that bound it. Strokes
+are oriented curves.
+"""
 
 from __future__ import annotations
 
@@ -25,32 +29,33 @@ from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..validation import SMALLEST_EXTENT
 
 PULL_UNITS = 2.0**40
-"""Sum of all pulls to one side after they are scaled to integers, with which the greatest flow is exact."""
+"""Sum of all pulls to one side after scaling. Pulls and costs are rounded to integers, so that the flow is exact."""
 
 
 @dataclass(frozen=True, eq=False)
 class CutGraph:
-    """A graph that is cut again and again, with other costs."""
+    """A graph for minimum cuts with different costs: n nodes, and two arcs for each of e edges, sorted by tail."""
 
-    starts: Ints  # (n + 1,) where the arcs of each node begin
-    heads: Ints  # (2 e,) where each arc leads
-    reverse: Ints  # (2 e,) the arc back
-    order: Ints  # (2 e,) edge of each arc, plus e if it runs backwards
+    starts: Ints  # (n + 1,) the arcs that leave node i are those from starts[i] to starts[i + 1]
+    heads: Ints  # (2 e,) the node that each arc leads to
+    reverse: Ints  # (2 e,) index of the opposite arc
+    order: Ints  # (2 e,) edge of each arc, plus e if the arc runs from the edge's second node to its first
 
     @classmethod
     def of(cls, edges: Ints, n: int) -> CutGraph:
-        """Make the graph of n nodes and (e, 2) edges, each of which is two arcs: number k and, backwards, k + e."""
+        """Make the graph of n nodes and (e, 2) edges."""
         tails, heads = np.concatenate([edges, edges[:, ::-1]]).T
         starts, order = grouped(tails, n)
-        place = np.empty(len(order), dtype=np.int64)
-        place[order] = np.arange(len(order))
-        return cls(starts, np.ascontiguousarray(heads[order]), place[(order + len(edges)) % len(order)], order)
+        rank = np.empty(len(order), dtype=np.int64)
+        rank[order] = np.arange(len(order))
+        return cls(starts, np.ascontiguousarray(heads[order]), rank[(order + len(edges)) % len(order)], order)
 
     def cut(self, falling: Floats, rising: Floats, pull: Floats, ties: Floats) -> Floats:
-        """Return the (n,) signs s = ±1 of nodes that minimise the cost of the edges cut, less Σ (pull + ties) s.
+        """Return (n,) signs s = ±1 of nodes that minimise the cost of cut edges less Σ (pull + ties) s.
 
-        Of several minima it is that with the fewest positive signs. An edge whose first node is positive and whose
-        second is negative costs `falling`, (e,), the reverse `rising`. Ties, (n,), are small, and all of one sign.
+        An edge costs `falling`, (e,), if its first node is positive and its second negative, and `rising` in the
+        opposite case. `pull` and `ties` are (n,); ties are small, and all of one sign. Of several minima, the one with
+        the fewest positive signs is returned.
         """
         both = pull + ties
         total = 2 * max(float(both[both > 0].sum()), -float(both[both < 0].sum()))
@@ -76,15 +81,17 @@ class CutGraph:
 Ids = Ints
 
 FREE, TERMINAL, ORPHAN = -1, -2, -3
-"""In place of the arc to its parent: for a node in no tree, next to a terminal, or cut off from its parent."""
+"""Values of `parent` in place of the index of an arc: the node is in no tree, is next to a terminal (the source or the
+sink), or has been cut off from its parent."""
 
 
 @compiled
 def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids) -> Bools:
-    """Return (n,) whether the source still reaches each node at the greatest flow (Boykov & Kolmogorov 2004).
+    """Compute a maximum flow, and return (n,) bool, true for nodes on the source's side of the minimum cut.
 
-    Arcs of node i are those from starts[i] to starts[i + 1]; `reverse` is the arc back. A pull is the capacity from the
-    source to a node, or, if negative, from it to the sink. `residual` and `pull` are overwritten.
+    This is the algorithm of Boykov & Kolmogorov (2004). The arrays are those of `CutGraph`. `residual` are the
+    capacities of arcs, (2 e,). A positive `pull`, (n,), is the capacity from the source to a node, a negative one that
+    from the node to the sink. `residual` and `pull` are overwritten.
     """
     n, now = len(pull), 1
     tree = np.sign(pull).astype(np.int8)  # 1 in the source's tree, −1 in the sink's
@@ -144,7 +151,11 @@ def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids)
 
 @compiled
 def _augment(heads: Ids, reverse: Ids, residual: Ids, pull: Ids, parent: Ids, meeting: int, orphans: Ids) -> int:
-    """Push the most that the path through an arc between the trees can bear; return how many orphans that makes."""
+    """Push as much flow as possible along the path through `meeting`, an arc from the source's tree to the sink's.
+
+    Nodes whose arc to the parent is saturated by it are marked as `ORPHAN` and written to `orphans`. Returns their
+    number.
+    """
     least = residual[meeting]
     for end in range(2):
         i = heads[reverse[meeting]] if end == 0 else heads[meeting]
@@ -189,7 +200,10 @@ def _adopted(
     now: int,
     p: int,
 ) -> bool:
-    """Return whether a neighbour of orphan p has a way to the terminal of its tree; the nearest becomes its parent."""
+    """Find a new parent for the orphan p among its neighbours, and return whether there is one.
+
+    A parent must be connected to the terminal of the same tree. Of several, the one nearest to the terminal is chosen.
+    """
     best, nearest = ORPHAN, np.int64(1) << 60
     for a in range(starts[p], starts[p + 1]):
         if tree[heads[a]] != tree[p] or residual[reverse[a] if tree[p] > 0 else a] == 0:
@@ -218,59 +232,60 @@ def _adopted(
 
 
 STROKE_WIDTH, WIDEST_STROKE = 2.0, 0.01
-"""Distance from a stroke up to which vertices count for whether it is explained: the first in edges of the mesh, but at
+"""Distance from a stroke up to which vertices count as being beside it. It is the first number of mean edges, but at
 most the second, a share of the length of all strokes. So a stroke drawn twice counts as one. Of 46 drawings none
-changes if both are halved or the first is doubled; one does if the second is."""
+changes if both are halved or the first is doubled; one does if the second is doubled."""
 STAIRCASE_LENGTH = 0.92
-"""Length of a line relative to the length of the dual edges that it cuts."""
+"""Typical length of a line relative to that of the staircase of dual edges along it. Costs are multiplied by it."""
 CORNER_ON_SEGMENT = 1e-6
-"""A corner is on a segment up to this height above it, relative to the longest side of its face."""
+"""Height of a corner above a segment, relative to the longest side of its face, up to which it lies on the segment."""
 FOLLOWED = 0.25
-"""The zero set follows a stroke where it is as near as this to the vertices beside it, in h."""
+"""|φ| at a vertex beside a stroke, in h, up to which the zero set of φ is taken to follow the stroke."""
 EQUAL_COSTS = 1e-6
-"""Two answers cost the same if they differ by less, relative to the length of all strokes: rounding would choose."""
+"""Difference of two costs, relative to the length of all strokes, below which they count as equal. Otherwise rounding
+would choose between them."""
 EXPLAINED = 0.5
-"""A stroke bounds the inside if it is explained to this share. Halved, none of 46 drawings changes; doubled, two
-change, and eleven more are announced."""
+"""Share of a stroke from which on it bounds the inside (`Inside.explained`). Halved, none of 46 drawings changes;
+doubled, two change, and eleven more get a warning."""
 STROKES_AT_ONCE = 64
-"""Number of strokes for which `Strokes.agreed` solves at once."""
+"""Number of strokes for which `Strokes.agreed` solves a linear system at a time."""
 
 
 @dataclass(frozen=True, eq=False)
 class Inside:
-    """Sides for strokes that run in given directions."""
+    """An inside, chosen for strokes with given directions: a positive or negative side at every vertex of a surface."""
 
-    signs: Floats  # (k,) directions relative to the given ones: 1, −1 if turned, 0 if the stroke is left out
-    sides: Floats  # (n,) 1 or −1 at every vertex
-    # (k,) how far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but the wrong way round
+    signs: Floats  # (k,) directions of strokes: 1 as given, −1 if flipped, 0 if the stroke is left out
+    sides: Floats  # (n,) 1 or −1 at every vertex: left or right of the strokes that bound the inside
+    # (k,) how far each stroke bounds the inside: 1 all along, 0 nowhere, −1 all along but in the wrong direction
     explained: Floats
-    # the length of the boundary of the inside where no stroke is, less the length of strokes that is explained: a
-    # larger reward would pay for a line around a stroke, which is as long again
+    # the length of the boundary of the inside where no stroke is, less the explained length of strokes. A larger reward
+    # for strokes would pay for a boundary around a single stroke, which is twice as long
     energy: float
 
 
 @dataclass(frozen=True, eq=False)
 class Strokes:
-    """Oriented curves on a surface, and the energy of sets of vertices that they may bound."""
+    """k oriented curves on a surface with n vertices and e edges, and the energy of regions that they may bound."""
 
     surface: SurfaceDiscretization  # the surface that they lie on
     parts: Sequence[CurveSegments]  # the strokes
     lengths: Floats  # (k,) length of each stroke
-    # (k, n) half the mean over the vertices left of a stroke, less that over those right of it
+    # (k, n) takes values at vertices to half the difference of their means left and right of each stroke
     means: sparse.csr_matrix
     # (k, e) 1 where the first vertex of an edge is left of a stroke that crosses it, −1 where the second is
     crossed: sparse.csr_matrix
     fluxes: sparse.csr_matrix  # (k, n) integrals along each stroke of the slopes of hat functions towards its left
     width: float  # distance up to which strokes next to each other count as one
-    group: Ints  # (k,) the likely curve of each stroke: strokes with ends nearest to each other are likely to be one
-    is_loop: Bools  # (g,) whether that curve is likely to be closed: its gaps are shorter than half of its strokes
-    _found: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
+    group: Ints  # (k,) label of the likely curve of each stroke, which joins strokes with nearest ends
+    is_loop: Bools  # (g,) whether each likely curve is closed, with gaps that are short beside its strokes
+    _insides: dict[bytes, Inside] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(
         cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float, group: Ints, is_loop: Bools
     ) -> Strokes:
-        """Find which vertices are on which side of each stroke; `edge` is the mean length of an edge of the mesh."""
+        """Find the vertices on both sides of each stroke; `edge` is the mean length of an edge of the mesh."""
         triangles = surface.triangles
         lengths = np.array([part.lengths.sum() for part in parts])
         seen = sides_seen(triangles, parts)
@@ -289,17 +304,20 @@ class Strokes:
 
     @property
     def areas(self) -> Floats:
-        """(n,) area that belongs to each vertex."""
+        """Area of the part of the surface that belongs to each vertex, (n,) float."""
         return self.surface.triangles.vertex_areas
 
     @cached_property
     def graph(self) -> CutGraph:
-        """The vertices and edges of the surface."""
+        """Graph of the vertices and edges of the surface."""
         return CutGraph.of(self.surface.triangles.edges.vertices, self.surface.triangles.n_vertices)
 
     @cached_property
     def costs(self) -> Floats:
-        """(e,) length of the boundary between the vertices of each edge, if one of them is inside."""
+        """Length that the boundary of an inside has between the two vertices of each edge, (e,) float.
+
+        It is the length of the dual edge between barycentres of faces, times `STAIRCASE_LENGTH`.
+        """
         triangles = self.surface.triangles
         corners = triangles.corner_positions
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
@@ -309,9 +327,11 @@ class Strokes:
 
     @cached_property
     def agreed(self) -> Floats:
-        """(k, k) by how much ∫ |∇u|² is less for u that jumps by 1 across two strokes than for jumps across each alone.
+        """Agreement of the directions of each two strokes, (k, k) float.
 
-        Strokes that follow each other agree, and those within a width of each other, as copies do.
+        It says by how much ∫ |∇u|² is less for a function u that jumps by 1 across both strokes than for two functions
+        that each jump across one of them. It is large for strokes that follow each other, and for strokes within
+        `width` of each other, such as copies.
         """
         surface, fluxes = self.surface, self.fluxes
         masses = sparse.diags(self.areas)
@@ -327,30 +347,30 @@ class Strokes:
         return 0.5 * (result + result.T)
 
     def unexplained(self, inside: Inside) -> float:
-        """Return the length of the boundary of the inside where no stroke is, and of strokes that it does not follow.
+        """Return the length of the boundary without strokes plus the length of strokes that do not bound the inside.
 
-        Strokes that are left out count in full, and those that bound it the wrong way round twice.
+        Strokes that are left out count in full, and strokes that bound it in the wrong direction count twice.
         """
         return inside.energy + float(self.lengths.sum())
 
     def whole_loops(self, chosen: Bools) -> Bools:
-        """(g,) the loops all of whose strokes, (k,), are chosen."""
+        """Return (g,) bool, true for closed likely curves all of whose strokes are `chosen`, (k,)."""
         whole: Bools = self.is_loop & (np.bincount(self.group, chosen) == np.bincount(self.group))
         return whole
 
     @property
     def seen(self) -> list[Inside]:
         """Every result of `inside` so far."""
-        return list(self._found.values())
+        return list(self._insides.values())
 
     def by_heat(self, signs: Floats) -> Inside:
-        """Return the sides that the method gives strokes with these (k,) directions, 0 if left out.
+        """Return the inside by the signed heat method, for strokes with (k,) directions, 0 if left out.
 
-        Where φ is nearly 0 beside a stroke, its zero set follows the stroke.
+        Sides are the signs of φ. Where φ is nearly 0 beside a stroke, the stroke decides the side.
         """
-        taken = [[replace(p, vectors=s * p.vectors)] for p, s in zip(self.parts, signs.tolist(), strict=True) if s]
+        sources = [[replace(p, vectors=s * p.vectors)] for p, s in zip(self.parts, signs.tolist(), strict=True) if s]
         try:
-            source = self.surface.lower(taken, 1.0)
+            source = self.surface.lower(sources, 1.0)
         except CancellingNormalsError:  # no side is positive, so that nothing is explained
             positive = np.ones(self.surface.triangles.n_vertices)
             return Inside(signs, positive, np.zeros(len(signs)), float(self.lengths.sum()))
@@ -371,7 +391,7 @@ class Strokes:
         return Inside(signs, sides, explained, added - float(self.lengths @ explained))
 
     def _zero_set_lengths(self, phi: Floats) -> Floats:
-        """(m,) length of the zero set of φ, linear in each face."""
+        """Return (m,) lengths of the zero set of φ in each face, for φ linear in faces with values (n,) at vertices."""
         triangles = self.surface.triangles
         corners, values = triangles.corner_positions, phi[triangles.corner_vertices]
         following = np.roll(values, -1, axis=1)
@@ -383,27 +403,30 @@ class Strokes:
         return np.abs((places * signs).sum(axis=1))
 
     def _between(self, signs: Floats, sides: Floats) -> Inside:
-        """Return the sides, (n,), with what strokes explain of them."""
+        """Return the inside with (n,) sides of vertices, for strokes with (k,) directions; its boundary is on edges."""
         explained = signs * (self.means @ sides)
         energy = float(self._cut_costs(signs, sides).sum()) - float(self.lengths @ explained)
         return Inside(signs, sides, explained, energy)
 
     def _cut_costs(self, signs: Floats, sides: Floats) -> Floats:
-        """(e,) what the boundary between the sides of vertices, (n,), costs at edges, 0 along strokes."""
+        """Return (e,) costs of the boundary between the (n,) sides of vertices at each edge.
+
+        They are 0 at edges without a boundary, and where a stroke in its (k,) direction crosses the edge.
+        """
         falling, rising = self._uncovered(signs)
         first, second = sides[self.surface.triangles.edges.vertices].T
         return np.where(first > second, falling, np.where(first < second, rising, 0.0))
 
     def inside(self, signs: Floats) -> Inside:
-        """Return the inside of least energy, a minimum cut, for strokes with these (k,) directions, 0 if left out."""
+        """Return the inside of least energy, a minimum cut, for strokes with (k,) directions, 0 if left out."""
         key = signs.tobytes()
-        if key not in self._found:
-            self._found[key] = self._between(signs, self._cut(signs, -1.0))
-        return self._found[key]
+        if key not in self._insides:
+            self._insides[key] = self._between(signs, self._cut(signs, -1.0))
+        return self._insides[key]
 
-    def changed_share(self, one: Inside, other: Inside) -> float:
-        """Return the share of the area that is on different sides."""
-        return float(self.areas[one.sides != other.sides].sum() / self.areas.sum())
+    def changed_share(self, first: Inside, second: Inside) -> float:
+        """Return the share of the area on which two insides have different sides."""
+        return float(self.areas[first.sides != second.sides].sum() / self.areas.sum())
 
     def either_way(self, inside: Inside) -> float:
         """Return the share of the area between the smallest and the largest inside of least energy.
@@ -420,13 +443,19 @@ class Strokes:
         return float(self.areas[reached & (largest != inside.sides)].sum() / self.areas.sum())
 
     def _cut(self, signs: Floats, larger: float) -> Floats:
-        """(n,) sides of least energy; of several, the largest (1) or smallest (−1)."""
+        """Return (n,) sides of least energy for strokes with (k,) directions.
+
+        Of several, those with the largest positive area if `larger` is 1, or the smallest if it is −1.
+        """
         pull = self.means.T @ (self.lengths * signs)
         ties = larger * EQUAL_COSTS * self.lengths.sum() / self.areas.sum() * self.areas
         return self.graph.cut(*self._uncovered(signs), pull, ties)
 
     def _uncovered(self, signs: Floats) -> tuple[Floats, Floats]:
-        """(e,) twice: what the boundary costs at edges, if their first or their second vertex is inside."""
+        """Return (e,) costs of a boundary at each edge if its first vertex is positive, and if its second vertex is.
+
+        They are 0 where a stroke, in its (k,) direction, crosses the edge with the positive vertex to its left.
+        """
         along = self.crossed.multiply(signs[:, None]).tocsr()
         covered = [np.asarray((along * way > 0).sum(axis=0)).ravel() > 0 for way in (1, -1)]
         falling, rising = (np.where(mask, 0.0, self.costs) for mask in covered)
@@ -434,7 +463,10 @@ class Strokes:
 
 
 def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
-    """(k, n) integrals along curves of the slopes of hat functions to their left; along edges, means over the faces."""
+    """Return (k, n) integrals along each of k curves of the slope of each vertex's hat function towards the left.
+
+    Along edges, the slope is the mean over the faces at the edge.
+    """
     placed = PlacedSegments.of(triangles, parts)
     owners = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[placed.given]
     grows = 1j * np.diff(placed.positions, axis=1) * placed.sides[:, None]
@@ -447,7 +479,11 @@ def fluxes_across(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> s
 
 
 def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> sparse.csr_matrix:
-    """(k, n) sparse: 3 at corners of crossed faces that lie left of a stroke, 1 right of it, 2 on it."""
+    """Find the side on which the corners of the faces that a stroke crosses lie.
+
+    Returns a sparse matrix, (k, n), with 3 at vertices left of a stroke, 1 at those right of it, and 2 at those on it.
+    (The values are 2 + side, since a sparse matrix does not keep zeros.) The nearest segment of the stroke decides.
+    """
     placed = PlacedSegments.of(triangles, parts)
     owners = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])[placed.given]
     steps = np.diff(placed.positions, axis=1)
@@ -471,7 +507,11 @@ def sides_seen(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> spar
 
 
 def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> sparse.csr_matrix:
-    """(k, n) sparse: ±1 left or right of a stroke, at corners of faces that it crosses and vertices near these."""
+    """Extend sides of strokes to vertices farther away.
+
+    `seen` is the result of `sides_seen`. Returns a sparse matrix, (k, n), with 1 at vertices left and −1 at vertices
+    right of a stroke, up to `width` along edges from the corners of the faces that the stroke crosses.
+    """
     n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
     both_ways = np.concatenate([tails, heads]), np.concatenate([heads, tails])
@@ -497,7 +537,7 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> 
 
 
 def _means(chosen: sparse.csr_matrix, areas: Floats) -> sparse.csr_matrix:
-    """(k, n) sparse weights by area: the mean over the vertices chosen in each row."""
+    """Return a (k, n) sparse matrix whose rows average values, weighted by area, over the vertices `chosen` in them."""
     weighted = sparse.csr_matrix(chosen.astype(bool).astype(float) @ sparse.diags(areas))
     total = np.asarray(weighted.sum(axis=1)).ravel()
     return sparse.csr_matrix(sparse.diags(1 / np.where(total > 0, total, 1.0)) @ weighted)
