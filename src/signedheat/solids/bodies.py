@@ -40,7 +40,7 @@ ROUNDING = ONE_PLACE * 2.0**-24
 PROOF_SAMPLES = 20_000
 """Largest number of faces whose sides are compared, evenly spread over all."""
 WRONG_VOLUME = 1e-6
-"""Largest share of the volume of a solid by which what is proven equal to it may differ."""
+"""Triangles count as the boundary of a solid if they may differ from it by at most this share of its volume."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Bodies:
 
     @classmethod
     def of_chain(cls, windings: Windings) -> Bodies | None:
-        """Separate the bodies of a chain; None if edges cannot be paired."""
+        """Separate the bodies of a chain; None if edges cannot be paired, or if a body passes through itself."""
         points, faces = indexed(windings.triangles)
         proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
         points, faces = separated(points, faces[proper], overlapping=True)
@@ -62,7 +62,7 @@ class Bodies:
 
     @classmethod
     def of_mesh(cls, mesh: TriangleMesh, windings: Windings) -> Bodies | None:
-        """Take the parts of a mesh, all of which must be closed, and turn them as the chain made of them faces."""
+        """Return the parts of a mesh, oriented as its chain is; None unless all are closed and orientable."""
         faces = mesh.faces[(mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)]
         areas = face_areas(mesh.vertices[faces])
         oriented = orient_faces(faces, areas, mesh.n_vertices)
@@ -73,15 +73,15 @@ class Bodies:
         labels, volumes = part_volumes(points, faces)
         faces = np.where((volumes < 0)[labels][:, None], faces[:, ::-1], faces)
         # the inside ends in front of the faces of bodies, and behind those of cavities
-        rows, places = _beside(points[faces], tolerances(points, faces, SAME_POINT))
-        behind, ahead = windings.inside(places).reshape(2, -1).astype(np.int64)
+        rows, points_beside = _beside(points[faces], tolerances(points, faces, SAME_POINT))
+        behind, ahead = windings.inside(points_beside).reshape(2, -1).astype(np.int64)
         inner = np.bincount(labels[rows], (behind - ahead) * face_areas(points[faces])[rows], len(volumes)) < 0
         faces = np.where(inner[labels][:, None], faces[:, ::-1], faces)
         return cls(points, faces, labels, np.where(inner, -1.0, 1.0) * np.abs(volumes))._clean
 
     @property
     def _clean(self) -> Bodies | None:
-        """These bodies, or None if an edge has not two faces, or if a body passes through itself."""
+        """These bodies; None if an edge does not have two faces, or if a body passes through itself."""
         table = edge_table(self.faces)
         if (table.face_counts != 2).any() or (table.balance != 0).any():  # manifold3d may crash on such meshes
             return None
@@ -93,29 +93,29 @@ class Bodies:
         """(k, 3, 3) triangles that bound the union, without cavities that lie in a single body; None if it fails."""
         widths = tolerances(self.points, self.faces, ROUNDING)
         flat = np.abs(self.volumes) <= np.bincount(self.labels, widths * face_areas(self.points[self.faces]))
-        made: dict[int, Any] = {}
+        manifolds: dict[int, Any] = {}
         for body in np.flatnonzero(~flat).tolist():
             used, faces = np.unique(self.faces[self.labels == body], return_inverse=True)
             faces = faces.reshape(-1, 3)[:, :: 1 if self.volumes[body] > 0 else -1]
-            made[body] = manifold3d.Manifold(manifold3d.Mesh64(self.points[used], faces.astype(np.uint64)))
-            if made[body].status() != manifold3d.Error.NoError or made[body].is_empty():
+            manifolds[body] = manifold3d.Manifold(manifold3d.Mesh64(self.points[used], faces.astype(np.uint64)))
+            if manifolds[body].status() != manifold3d.Error.NoError or manifolds[body].is_empty():
                 return None
-        outer = [body for body in made if self.volumes[body] > 0]
-        for cavity in (body for body in made if self.volumes[body] < 0):
-            place = self.points[self.faces[np.argmax(self.labels == cavity)]].mean(axis=0)[None]
-            around = [body for body in outer if self._windings(body).numbers_once(place)[0] > 0.5]
-            if not around:
+        outer = [body for body in manifolds if self.volumes[body] > 0]
+        for cavity in (body for body in manifolds if self.volumes[body] < 0):
+            point = self.points[self.faces[np.argmax(self.labels == cavity)]].mean(axis=0)[None]
+            bodies_around = [body for body in outer if self._windings(body).numbers_once(point)[0] > 0.5]
+            if not bodies_around:
                 return None
-            if len(around) == 1:
-                made[around[0]] -= made[cavity]
+            if len(bodies_around) == 1:
+                manifolds[bodies_around[0]] -= manifolds[cavity]
         if not outer:
             return None
-        whole = manifold3d.Manifold.batch_boolean([made[body] for body in outer], manifold3d.OpType.Add)
+        whole = manifold3d.Manifold.batch_boolean([manifolds[body] for body in outer], manifold3d.OpType.Add)
         mesh = whole.to_mesh64()
         return np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts).astype(np.int64)]
 
     def _windings(self, body: int) -> Windings:
-        """Winding numbers of one body."""
+        """Winding numbers of a single body, given by its label."""
         return Windings(self.points[self.faces[self.labels == body]])
 
 
@@ -130,7 +130,10 @@ def crossing_faces(points: Floats, faces: Ints, depths: Floats) -> Ints:
 
 @compiled
 def _are_deep(corners: Floats, pairs: Ints, depths: Floats) -> Bools:
-    """Return (k,) whether pairs of triangles overlap by their depth, those with a common vertex as all others."""
+    """(k,) whether (k, 2) pairs of triangles overlap by more than the smaller of their (m,) depths.
+
+    Corners are (m, 9). Pairs with a common vertex are tested as all others.
+    """
     result, ways = np.empty(len(pairs), dtype=np.bool_), np.empty((10, 3))
     for k in range(len(pairs)):
         f, g = pairs[k]
@@ -140,15 +143,15 @@ def _are_deep(corners: Floats, pairs: Ints, depths: Floats) -> Bools:
 
 
 def whole_boundary(triangles: Floats, windings: Windings, mesh: TriangleMesh | None = None) -> Floats | None:
-    """Find (k, 3, 3) triangles that bound the solid of a chain; None if no way to cut it is proven.
+    """Find (k, 3, 3) triangles that are proven to bound the solid of a chain; None if no way to unite its bodies works.
 
-    `triangles` are those of a cut that is not, and `mesh` is the mesh that the chain was made of, if that is known.
+    `triangles`, (m, 3, 3), are an attempt that is not proven. `mesh` is the mesh that the chain was made of, if known.
     """
     return next((made for made in _candidates(triangles, windings, mesh) if same_solid(made, windings)), None)
 
 
 def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None) -> Iterator[Floats]:
-    """Yield (k, 3, 3) triangles that may bound the solid, the best way to unite its bodies first."""
+    """Yield (k, 3, 3) triangles that may bound the solid, made in different ways, the most promising one first."""
     for given in (mesh, None) if mesh is not None else (None,):
         bodies = Bodies.of_chain(windings) if given is None else Bodies.of_mesh(given, windings)
         united = None if bodies is None else bodies.united
@@ -161,13 +164,13 @@ def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None
 
 
 def _without_slits(triangles: Floats) -> Floats:
-    """Drop what manifold3d may leave where bodies touch: faces that lie on others, which face the opposite way."""
+    """Drop pairs of faces that lie on each other and face opposite ways, as manifold3d may leave where bodies touch."""
     pieces = arranged(*indexed(triangles))
     return _coned(pieces.points, without_doubles(pieces.faces))
 
 
 def _cut_again(triangles: Floats, windings: Windings) -> tuple[Floats, Ints]:
-    """Divide triangles where they cross or end on each other; drop those that lie inside or cancel in pairs."""
+    """Divide (m, 3, 3) triangles where they meet; return points and faces of those that bound the inside."""
     points, faces = indexed(triangles)
     slacks, every = tolerances(points, faces, SAME_POINT), np.ones(len(faces), dtype=bool)
     pieces, regions = cut_and_sided(partial(arranged, points, faces, None), slacks, every, windings)
@@ -183,7 +186,7 @@ def without_doubles(faces: Ints) -> Ints:
 
 
 def _coned(points: Floats, faces: Ints) -> Floats:
-    """Close triangles by cones from one vertex of each simple loop of their boundary."""
+    """Close faces by fans from a vertex of each simple loop of their boundary; return all (k, 3, 3) triangles."""
     table = edge_table(faces)
     ends = np.where((table.balance < 0)[:, None], table.vertices[:, ::-1], table.vertices)
     fans = [fan(loop) for loop in _simple_loops(np.repeat(ends, np.abs(table.balance), axis=0))]
@@ -191,36 +194,35 @@ def _coned(points: Floats, faces: Ints) -> Floats:
 
 
 def _simple_loops(edges: Ints) -> Iterator[Ints]:
-    """Yield loops of directed edges (k, 2), against their direction, none of which passes a vertex twice.
+    """Yield the vertices of loops along (k, 2) directed edges, against their direction.
 
-    As many edges end at each vertex as begin there.
+    No loop passes a vertex twice. As many edges must end at each vertex as begin there.
     """
     onward: dict[int, list[int]] = {}
     for tail, head in edges.tolist():
         onward.setdefault(head, []).append(tail)
     for start in onward:
-        path, places = [start], {start: 0}
+        path, index_on_path = [start], {start: 0}
         while onward[path[-1]]:
             vertex = onward[path[-1]].pop()
-            if vertex not in places:
-                places[vertex] = len(path)
+            if vertex not in index_on_path:
+                index_on_path[vertex] = len(path)
                 path.append(vertex)
                 continue
-            loop = path[places[vertex] :]
+            loop = path[index_on_path[vertex] :]
             if len(loop) > 2:
                 yield np.array(loop)
             for passed in loop[1:]:
-                del places[passed]
-            del path[places[vertex] + 1 :]
+                del index_on_path[passed]
+            del path[index_on_path[vertex] + 1 :]
 
 
 def same_solid(triangles: Floats, windings: Windings) -> bool:
-    """Whether triangles are closed and bound the solid of some winding numbers, up to rounding.
+    """Whether (m, 3, 3) triangles are closed and bound the solid that `windings` describe, up to rounding.
 
     On both sides of the triangles, and of those of the solid, their own winding number must be 1 where the inside of
-    the solid is and 0 elsewhere, at one of the distances up to which a cut may merge points. Those that are wrong
-    nevertheless must be so small that they cannot enclose `WRONG_VOLUME`: a surface of area A encloses at most
-    A^1.5 / (6 √π).
+    the solid is and 0 elsewhere, at one of the distances up to which a cut may merge points. Triangles where this fails
+    must be so small that they cannot enclose `WRONG_VOLUME`: a surface of area A encloses at most A^1.5 / (6 √π).
     """
     points, faces = indexed(triangles)
     if not len(faces) or (edge_table(faces).balance != 0).any():
@@ -233,8 +235,8 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
             checked, widths = halved(checked), np.tile(widths, 2)
         wrong = np.arange(len(checked))
         for multiple in TOLERANCES:
-            rows, places = _beside(checked[wrong], multiple * widths[wrong])
-            differ = np.abs(made.numbers(places) - windings.inside(places)) > 0.5
+            rows, points_beside = _beside(checked[wrong], multiple * widths[wrong])
+            differ = np.abs(made.numbers(points_beside) - windings.inside(points_beside)) > 0.5
             wrong = wrong[rows[differ.reshape(2, -1).any(axis=0)]]
         wrong_area += float(face_areas(checked[wrong]).sum()) * len(chain) / len(chosen)
     corners = triangles - points.mean(axis=0)
@@ -243,12 +245,15 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
 
 
 def _beside(triangles: Floats, steps: Floats) -> tuple[Ints, Floats]:
-    """Return which of (m, 3, 3) triangles are wider than two steps, (k,), and (2 k, 3) places behind and before."""
+    """Return points beside (m, 3, 3) triangles at the distances `steps`, (m,), for those wider than two steps.
+
+    The first array has the (k,) rows of these triangles, the second k points behind them and then k in front.
+    """
     rows = np.flatnonzero(heights(triangles) > 2.0 * steps)
     centres, away = triangles[rows].mean(axis=1), steps[rows, None] * unit(area_vectors(triangles[rows]))
     return rows, np.concatenate([centres - away, centres + away])
 
 
 def _spread(count: int) -> Ints:
-    """Return at most `PROOF_SAMPLES` rows, evenly spread over all."""
+    """Return at most `PROOF_SAMPLES` row numbers below `count`, evenly spread."""
     return np.linspace(0, count - 1, min(count, PROOF_SAMPLES)).astype(np.int64)

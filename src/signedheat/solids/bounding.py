@@ -1,12 +1,12 @@
 """Which triangles of a shape bound a solid, and which way they face.
 
 The shape is read as it was given first. Each connected part that this leaves unexplained is read in other ways, too
-(`readings`), and the reading that leaves the least area unexplained is taken; as given wins ties.
+(`readings`). The reading that leaves the least area unexplained is used; as given wins ties.
 
-Closed pieces are kept whole, and turned outwards as a whole; within another body each keeps the orientation it was
-given relative to that body. All other pieces are open, and Gauss's formula (`gauss`) decides for all of them together
-which of them bound something, and which way they face if that is not given; it takes bodies that overlap into account
-(`overlaps`).
+Closed pieces are kept whole, and flipped as a whole to face outwards. Within another body each keeps the orientation
+it was given relative to that body. All other pieces are open. Gauss's formula (`gauss`) decides for all of them
+together which of them bound something, and which way they face if that is not given. It takes bodies that overlap into
+account (`overlaps`).
 """
 
 from __future__ import annotations
@@ -28,11 +28,12 @@ from .readings import Reading, as_given, mixed, once, unexplained
 from .rims import meeting_edges, open_edges
 
 LEAST_GAIN = 0.1
-"""Another reading must explain more than that as given, by this share of the area that counts in another way."""
+"""Another reading replaces the present one if the area that it explains in addition exceeds this share of the area
+that counts differently."""
 WELL_EXPLAINED = 1e-3
-"""A part of which less than this share is unexplained is taken as given: winding numbers are as inexact as that."""
+"""Parts are kept as given if a smaller share of their area is unexplained, since winding numbers are no more exact."""
 MOSTLY_WRONG = 0.5
-"""A part of which more than this share is unexplained may be turned as a whole, or be a cavity of what is around it."""
+"""Parts of which more than this share is unexplained may be flipped as a whole, or be cavities of the body around."""
 COHERENT_LEVELS = 0.7
 """Loose pieces are the remains of a body if the squared mean of their levels over the mean square is at least this.
 Bodies have 0.81 to 1, however little is left; leaves, cards and strips have 0.3 to 0.6, however many there are."""
@@ -41,7 +42,8 @@ CHANCE_LEVEL = 0.42
 Two sheets a quarter of their width apart have 0.38, three sides of a box 0.2, a side that four others lack 0.47, and a
 ball that has lost 85 % of its faces 0.95."""
 PARTLY_INSIDE = 0.25
-"""Loose pieces lie along closed ones if the mean winding number of these there is not this near to a whole number."""
+"""Loose pieces lie along closed ones, as noisy copies do, if the mean winding number of these there differs from whole
+numbers by more than this."""
 GAP_REACH = 1.5
 """Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
 
@@ -50,8 +52,8 @@ GAP_REACH = 1.5
 class Bounding(Frozen):
     """Decision which triangles of a chain bound something, and which way they face."""
 
-    pieces: Ints  # (m,) piece that each triangle is of
-    turned: Bools  # (m,) which must turn from the way in which they were given first
+    pieces: Ints  # (m,) piece that each triangle belongs to
+    turned: Bools  # (m,) which must be flipped from the orientation in which they were given first
     counts: Ints  # (m,) how often each bounds, negative if reversed; 0 for sheets, inner walls and faces that cancel
     closed: Bools  # (m,) which belong to closed pieces
     # (m,) cluster, where it consists mostly of loose pieces, which bound only together; −1 for all other triangles
@@ -68,7 +70,7 @@ class Bounding(Frozen):
     overlapping: bool  # whether there are open bodies that ignore others, since they overlap or lie within them
 
     def to_turn(self, chain: Chain) -> Bools:
-        """(k,) whether each given triangle must turn; triangles on fewer than three places need not."""
+        """(k,) whether each given triangle must be flipped; never those on fewer than three vertices."""
         as_given, turned = (np.append(values, False)[chain.numbers] for values in (self.as_given, self.turned))
         ways = np.where(as_given, chain.reversed != self.reversed, chain.reversed)
         return np.asarray((chain.numbers >= 0) & (ways != turned))
@@ -79,15 +81,15 @@ class _Parts:
     """Connected parts of a chain that are not whole as given; loose triangles, which tell little, are one part."""
 
     chain: Chain
-    whole: Bools  # (m,) which triangles are in none
-    pieces: Ints  # (m,) piece, as given, of each triangle; −1 where it is in none
+    whole: Bools  # (m,) which triangles are in no part, since they are whole as given
+    pieces: Ints  # (m,) piece, as given, of each triangle; −1 if it is in no part
     of_pieces: Ints  # (q,) part of each piece
-    of_triangles: Ints  # (m,) part of each triangle, or −1
-    areas: Floats  # (p,) areas
+    of_triangles: Ints  # (m,) part of each triangle; −1 if it is in none
+    areas: Floats  # (p,) area of each part
 
     @classmethod
     def of(cls, chain: Chain, given: Reading) -> _Parts:
-        """Find the parts of a chain as it was given."""
+        """Find the parts of a chain, read as `given`."""
         whole, pieces = given.whole, np.full(len(given.whole), -1)
         names, pieces[~whole] = np.unique(given.pieces[~whole], return_inverse=True)
         loose = np.bincount(chain.complexes)[chain.complexes] == 1
@@ -102,16 +104,16 @@ class _Parts:
         areas = np.bincount(self.pieces[~self.whole], self.chain.areas[~self.whole]).astype(np.float64)
         return means(unexplained(self.chain, decided.counts, self.pieces), self.of_pieces, areas, len(self.areas))
 
-    def changed(self, decided: Bounding, other: Bounding) -> Floats:
-        """(p,) share of the area of each part that counts in another way."""
-        rows = np.flatnonzero(~self.whole & (decided.counts != other.counts))
+    def changed(self, first: Bounding, second: Bounding) -> Floats:
+        """(p,) share of the area of each part that counts differently in two decisions."""
+        rows = np.flatnonzero(~self.whole & (first.counts != second.counts))
         areas = np.bincount(self.of_triangles[rows], self.chain.areas[rows], len(self.areas))
         return np.asarray(areas / np.maximum(self.areas, 1e-300))
 
-    def differ(self, one: Reading, other: Reading) -> Bools:
+    def differ(self, first: Reading, second: Reading) -> Bools:
         """(p,) whether two readings count, or connect, triangles of each part in different ways."""
-        firsts = [first_members(reading.pieces, len(reading.orientable))[reading.pieces] for reading in (one, other)]
-        rows = np.flatnonzero(~self.whole & ((one.counts != other.counts) | (firsts[0] != firsts[1])))
+        firsts = [first_members(reading.pieces, len(reading.orientable))[reading.pieces] for reading in (first, second)]
+        rows = np.flatnonzero(~self.whole & ((first.counts != second.counts) | (firsts[0] != firsts[1])))
         return mask_of(len(self.areas), self.of_triangles[rows])
 
 
@@ -128,10 +130,13 @@ class _Trial:
 
 
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
-    """Decide which triangles bound something and which way they face, or take them as oriented."""
+    """Decide which triangles of a chain bound something, and which way they face; `as_oriented` keeps how they face.
+
+    `nested` says how closed parts within others face, see `complete`.
+    """
     given = as_given(chain, chain.reversed)
     whole = given.whole
-    held = ~whole & (as_oriented or nested == "given")  # what does not turn if it is read as given
+    held = ~whole & (as_oriented or nested == "given")  # these are not flipped if they are read as given
     decided = _decided(chain, given, held, nested, as_oriented)
     if as_oriented or whole.all():
         return decided
@@ -140,30 +145,30 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     readings, chosen, overlapping = [given], np.zeros(len(whole), dtype=np.int64), False
     if cone_volumes(chain.triangles, given.counts, parts.of_triangles + 1, len(parts.areas) + 1).sum() < 0:
         inside_out = _reversed(given)
-        other = _decided(chain, inside_out, held, nested)
-        left = parts.missing(other)
-        if parts.areas @ left < parts.areas @ missing - LEAST_GAIN * parts.areas.sum():
-            readings, decided, missing = [inside_out], other, left
+        candidate = _decided(chain, inside_out, held, nested)
+        left_unexplained = parts.missing(candidate)
+        if parts.areas @ left_unexplained < parts.areas @ missing - LEAST_GAIN * parts.areas.sum():
+            readings, decided, missing = [inside_out], candidate, left_unexplained
     by_once = once(chain)
     for trial in _trials(chain, parts, given, by_once, missing, nested):
-        todo = trial.parts & (missing >= trial.least)
-        if not todo.any() or (trial.overlaps and not overlapping):
+        improvable = trial.parts & (missing >= trial.least)
+        if not improvable.any() or (trial.overlaps and not overlapping):
             continue
         readings.append(trial.reading)
         best = float(parts.areas @ missing), decided, chosen, missing
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
-            tried = np.where(~whole & todo[parts.of_triangles], len(readings) - 1, chosen)
-            reading, fixed = mixed(chain, readings, tried), held & (tried == 0)
-            other = _decided(chain, reading, fixed, trial.nested or nested, united=trial.united)
-            overlapping |= other.overlapping
-            left, price = parts.missing(other), LEAST_GAIN * parts.changed(decided, other)
-            cost = float(parts.areas @ (left + price))
+            assignment = np.where(~whole & improvable[parts.of_triangles], len(readings) - 1, chosen)
+            reading, fixed = mixed(chain, readings, assignment), held & (assignment == 0)
+            candidate = _decided(chain, reading, fixed, trial.nested or nested, united=trial.united)
+            overlapping |= candidate.overlapping
+            left_unexplained, price = parts.missing(candidate), LEAST_GAIN * parts.changed(decided, candidate)
+            cost = float(parts.areas @ (left_unexplained + price))
             if cost < best[0]:
-                best = cost, other, tried, left
-            better = todo & (left < missing - price)
-            if (better == todo).all() or not better.any():
+                best = cost, candidate, assignment, left_unexplained
+            better = improvable & (left_unexplained < missing - price)
+            if (better == improvable).all() or not better.any():
                 break
-            todo = better
+            improvable = better
         _, decided, chosen, missing = best
     inside = unexplained(chain, decided.counts, parts.pieces) < MOSTLY_WRONG
     inner = decided.inner | (~whole & ~decided.as_given & (decided.counts == 0) & inside[parts.pieces])
@@ -174,7 +179,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 def _trials(
     chain: Chain, parts: _Parts, given: Reading, by_once: Reading, missing: Floats, nested: Nesting
 ) -> list[_Trial]:
-    """List the readings to try after that as given, which leaves the (p,) shares `missing` of the parts."""
+    """List the readings to try after that as given, in order; it leaves the (p,) shares `missing` unexplained."""
     agreed = chain.agreeing_as_indexed()
     agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
     agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
@@ -192,7 +197,10 @@ def _trials(
 
 
 def _with_sheets_agreeing(chain: Chain, decided: Bounding, agreeing: Reading, whole: Bools) -> Bounding:
-    """Turn the triangles of complexes that bound nothing so that they agree with their neighbours."""
+    """Orient the triangles of components that bound nothing as in the reading `agreeing`, like their neighbours.
+
+    A component is one across edges of any number of triangles; `whole` ones, (m,), are left as they are.
+    """
     sheets = ~whole & (np.bincount(chain.complexes, decided.counts != 0) == 0)[chain.complexes]
     if not sheets.any():
         return decided
@@ -208,12 +216,12 @@ def _with_sheets_agreeing(chain: Chain, decided: Bounding, agreeing: Reading, wh
 
 
 def _with_ways(chain: Chain, reading: Reading, reversed: Bools) -> Reading:
-    """Read a chain as given but for triangles that are reversed; a reading for which these are the same is kept."""
+    """Read a chain as given with (k,) triangles `reversed`; return `reading` itself if it reverses the same ones."""
     return reading if np.array_equal(reversed, reading.reversed) else as_given(chain, reversed)
 
 
 def _reversed(reading: Reading) -> Reading:
-    """Turn all triangles that are not in whole complexes, which are turned anyway if they face inwards."""
+    """Reverse all triangles but the `whole` ones, which `_decided` orients outwards anyway."""
     counts, turned = np.where(reading.whole, 1, -1) * reading.counts, reading.turned != ~reading.whole
     return replace(reading, counts=counts, turned=turned)
 
@@ -226,9 +234,10 @@ def _decided(
     as_oriented: bool = False,
     united: bool = True,
 ) -> Bounding:
-    """Decide which pieces of a reading bound something and which way they face; those that are `fixed` do not turn.
+    """Decide which pieces of a reading bound something and which way they face.
 
-    Open bodies that overlap are `united`, or else they are one body's outside and inside.
+    Pieces with `fixed` triangles, (m,), are not flipped. Open bodies that overlap are `united`; without that, they are
+    the outside and the inside of one body.
     """
     counts, pieces, orientable, whole = reading.counts, reading.pieces, reading.orientable, reading.whole
     n = len(orientable)
@@ -236,29 +245,31 @@ def _decided(
     open_pieces = (chain.open_edges(counts, pieces) > 0) | (idle & (np.bincount(pieces, whole, n) == 0))
     closed = ~open_pieces & orientable
     flips, levels, loose, bounds = np.ones(n), np.full(n, 0.5), np.full(n, -1), closed.copy()
-    rest, overlapping = np.flatnonzero((open_pieces & orientable)[pieces] & (counts != 0)), False
-    if len(rest):
-        names, labels = np.unique(pieces[rest], return_inverse=True)
-        triangles = directed(chain.triangles[rest], np.sign(counts[rest]))
-        edges, owners = open_edges(chain.faces[rest], labels)
-        groups = connected_pieces(chain, rest, labels, edges, owners)
+    open_faces, overlapping = np.flatnonzero((open_pieces & orientable)[pieces] & (counts != 0)), False
+    if len(open_faces):
+        names, labels = np.unique(pieces[open_faces], return_inverse=True)
+        triangles = directed(chain.triangles[open_faces], np.sign(counts[open_faces]))
+        edges, owners = open_edges(chain.faces[open_faces], labels)
+        groups = connected_pieces(chain, open_faces, labels, edges, owners)
         ends = chain.positions[edges]
         rims = Rims(ends.mean(axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), owners)
         around = np.zeros((0, 3, 3))
         if closed.any() and not as_oriented:
             facing = _nested(chain, pieces, counts * closed[pieces], closed, flips, nested)[0]
             around = directed(chain.triangles, counts * (closed * facing)[pieces])
-        given = sums_of(np.sign(counts[rest] * chain.multiplicities[rest]) * chain.areas[rest], labels, len(names))
-        held = np.bincount(labels, fixed[rest]) > 0
+        given = sums_of(
+            np.sign(counts[open_faces] * chain.multiplicities[open_faces]) * chain.areas[open_faces], labels, len(names)
+        )
+        fixed_pieces = np.bincount(labels, fixed[open_faces]) > 0
         signs, bounds[names], loose[names], levels[names], overlapping = open_bounding(
-            Pieces(triangles, labels), groups, rims, given, around, held, nested, united
+            Pieces(triangles, labels), groups, rims, given, around, fixed_pieces, nested, united
         )
         flips[names] = np.where(bounds[names], signs, 1.0)
     bodies = inwards = 0
     if closed.any() and not as_oriented:
         flips, bodies, inwards = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
     if (loose >= 0).any() and closed.any():
-        along = _along(chain, pieces, loose, counts * flips[pieces] * closed[pieces])
+        along = _along_closed(chain, pieces, loose, counts * flips[pieces] * closed[pieces])
         bounds &= ~along
         loose[along] = -1
     turned = reading.turned != (flips[pieces] < 0)
@@ -291,10 +302,10 @@ def _decided(
 def _nested(
     chain: Chain, pieces: Ints, counts: Ints, closed: Bools, flips: Floats, nested: Nesting
 ) -> tuple[Floats, int, int]:
-    """Return (p,) signs that turn closed pieces outwards, and the numbers of bodies and of cavities within others.
+    """Return (p,) signs, −1 for closed pieces to flip, and the numbers of bodies and of cavities within others.
 
-    Those within others face as `nested` says: with "given" as they were given relative to the
-    outermost body, or by depth if that is unclear.
+    Outermost pieces face outwards. Those within others face as `nested` says: with "given" as they were given relative
+    to the outermost body, or by depth if that is unclear. Pieces that are not `closed` keep their signs `flips`.
     """
     n = len(closed)
     counted = np.flatnonzero(counts != 0)
@@ -304,11 +315,11 @@ def _nested(
     if len(np.unique(owners)) == 1:
         return outward, 0, 0
     names, labels = np.unique(owners, return_inverse=True)
-    faces, places = sampled(Pieces(triangles, labels), 16 * len(names))
+    faces, points = sampled(Pieces(triangles, labels), 16 * len(names))
     probes, own = owners[faces], np.abs(counts[counted[faces]])
     normals = unit(area_vectors(triangles[faces]))
     tree = WindingTree.of(directed(chain.triangles, counts * outward[pieces]))
-    around = tree.levels(places, normals, chain.areas[counted[faces]]) - 0.5 * own
+    around = tree.levels(points, normals, chain.areas[counted[faces]]) - 0.5 * own
     depth = np.full(n, np.inf)
     np.minimum.at(depth, probes, np.round(around - 0.25))  # a copy a rounding apart, at level ½, is not around
     depth = np.where(closed & np.isfinite(depth), depth, 0.0)
@@ -320,7 +331,7 @@ def _nested(
     way = np.where(given >= 0, 1.0, -1.0)
     rows, outermost = np.flatnonzero(inner[probes]), np.zeros(n)
     roots = WindingTree.of(directed(chain.triangles, counts * (way * (depth <= 0))[pieces]))
-    np.add.at(outermost, probes[rows], roots.numbers(places[rows]))
+    np.add.at(outermost, probes[rows], roots.numbers(points[rows]))
     by_depth = np.where(depth % 2 == 0, 1.0, -1.0)
     facing = np.where(clear, outward * way * np.where(outermost >= 0, 1.0, -1.0), by_depth)
     facing = {"given": facing, "cavities": by_depth, "bodies": np.ones(n)}[nested]
@@ -338,19 +349,20 @@ def open_bounding(
     nested: Nesting = "given",
     united: bool = True,
 ) -> tuple[Floats, Bools, Ints, Floats, bool]:
-    """Find for open pieces, (p,) each: signs, whether they bound something, clusters of loose ones or −1, and levels.
+    """Orient open pieces, and decide which of them bound something.
 
-    Also say whether bodies were found that ignore others.
+    Return, (p,) each, signs, whether pieces bound something, clusters of those that are loose or −1, and levels; and
+    whether there are bodies that ignore others. A piece is loose if neither it nor its group is a body by itself.
 
-    A piece is loose if neither it nor its group is a body by itself. Pieces that are `fixed`, (p,), have the sign 1. In
-    each round, pieces whose level is too low are left out if they leave at least half as much unexplained as the worst
-    one.
+    `groups` are (p,) connected groups of pieces, and `given` the (p,) area of each that faces as given, less the rest.
+    Pieces that are `fixed`, (p,), have the sign 1. `closed` are (k, 3, 3) triangles of closed pieces. In each round,
+    pieces whose level is too low are left out if they leave at least half as much unexplained as the worst one.
     """
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1
     alone = np.abs(levels_of_pieces(pieces))
     clusters, whole = clusters_of(pieces), system_of(pieces)
-    members = _counted(areas, np.arange(n), groups)[groups]
+    members = _effective_counts(areas, np.arange(n), groups)[groups]
     overlapping = False
     alive, weights = np.ones(n, dtype=bool), np.ones(n)  # the signs of the weights are those of the pieces
     if not fixed.all():
@@ -381,7 +393,7 @@ def open_bounding(
         shares = np.where(loose[rows], system.areas, 0.0)
         mean = means(values, clusters[rows], shares, n)
         square = means(values**2, clusters[rows], shares, n)
-        amount = _counted(areas * loose, groups, clusters)
+        amount = _effective_counts(areas * loose, groups, clusters)
         body = _is_body(mean, square, amount)
         thresholds = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
         least = np.where(body, thresholds, np.inf)[clusters]
@@ -399,7 +411,7 @@ def open_bounding(
 
 
 def _is_body(mean: Floats, square: Floats, pieces: Floats) -> Bools:
-    """Whether levels, given their means, their mean squares and the number of pieces, are those of a body."""
+    """(n,) whether levels are those of a body, given their means, mean squares and the numbers of pieces, (n,) each."""
     return (mean * np.sqrt(pieces + 1) >= CHANCE_LEVEL) & (mean**2 >= COHERENT_LEVELS * square)
 
 
@@ -408,8 +420,11 @@ def signs_of(weights: Floats) -> Floats:
     return np.where(weights >= 0, 1.0, -1.0)
 
 
-def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
-    """(p,) effective number of groups in each piece's cluster: (Σ a)² / Σ a², with a the areas of groups."""
+def _effective_counts(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
+    """(p,) effective number of groups in the cluster with each index: (Σ a)² / Σ a², with a the areas of groups.
+
+    All arguments are (p,), one value for each piece.
+    """
     n = len(areas)
     keys, inverse = np.unique(clusters * n + groups, return_inverse=True)
     sums, owners = np.bincount(inverse, areas), keys // n
@@ -418,7 +433,10 @@ def _counted(areas: Floats, groups: Ints, clusters: Ints) -> Floats:
 
 
 def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owners: Ints) -> Ints:
-    """(p,) component of each piece; pieces are joined by shared edges or by rims that run along each other."""
+    """(p,) component of each piece, connected by shared edges or by rims that run along each other.
+
+    `labels` are the pieces of the (k,) faces, `edges` the (r, 2) open edges of pieces, and `owners` their pieces.
+    """
     n = int(labels.max()) + 1
     hubs = np.unique(chain.complexes[faces[first_members(labels, n)]], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1
@@ -429,8 +447,11 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
     )[:n]
 
 
-def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) -> Bools:
-    """(p,) whether pieces are in loose clusters along closed pieces, as noisy copies are: half inside, half outside."""
+def _along_closed(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) -> Bools:
+    """(p,) whether pieces are in loose clusters along closed pieces, as noisy copies are: half inside, half outside.
+
+    `pieces` are (m,), `clusters` (p,) or −1; `counts`, (m,), say how often each triangle is part of a closed piece.
+    """
     chosen = np.flatnonzero(clusters[pieces] >= 0)
     around = WindingTree.of(directed(chain.triangles, counts)).numbers(chain.triangles[chosen].mean(axis=1))
     owners = clusters[pieces[chosen]]
@@ -439,16 +460,16 @@ def _along(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | Ints) ->
 
 
 def clusters_of(pieces: Pieces) -> Ints:
-    """(p,) cluster of each piece. Two pieces are joined if they are within `GAP_REACH` sizes of the smaller one."""
+    """(p,) cluster of each piece: pieces are connected if within `GAP_REACH` sizes of the smaller one of each other."""
     n = len(pieces.areas)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
     np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
     radii = 0.5 * np.linalg.norm(high - low, axis=1)
     elements = without_slender(pieces)
-    faces, places = sampled(elements, min(len(elements.labels), 100_000))
+    faces, points = sampled(elements, min(len(elements.labels), 100_000))
     owners = elements.labels[faces]
-    away, near = PointTree(places).query(places, min(9, len(places)))  # itself and 8
-    away, others = away.reshape(len(places), -1), owners[near].reshape(len(places), -1)
+    away, near = PointTree(points).query(points, min(9, len(points)))  # itself and 8
+    away, others = away.reshape(len(points), -1), owners[near].reshape(len(points), -1)
     joined = away < 2 * GAP_REACH * np.minimum(radii[owners][:, None], radii[others])
     return connected_components(n, np.repeat(owners, joined.sum(axis=1)), others[joined])

@@ -33,7 +33,7 @@ class Chain(Frozen):
     positions: Floats  # (n, 3) of the vertices, scaled by a power of two so that products do not overflow
     faces: Ints  # (m, 3) vertices of each distinct triangle, in the direction in which it was given first
     firsts: Ints  # (m,) first triangle of the mesh on the same corners as each
-    numbers: Ints  # (k,) distinct triangle of each given one; −1 for those on fewer than three places
+    numbers: Ints  # (k,) distinct triangle of each given one; −1 for those on fewer than three vertices
     reversed: Bools  # (k,) which given triangles run the other way than their distinct one
     given: Ints  # (k, 3) vertices of each given triangle, by the indices of the mesh
 
@@ -72,7 +72,7 @@ class Chain(Frozen):
         return self.multiplicities_with(self.reversed)
 
     def multiplicities_with(self, reversed: Bools) -> Ints:
-        """(m,) multiplicities if these (k,) given triangles are reversed."""
+        """(m,) multiplicities if `reversed`, (k,), are the given triangles that run opposite to their distinct ones."""
         proper = self.numbers >= 0
         ways = np.where(reversed[proper], -1, 1)
         return np.bincount(self.numbers[proper], ways, len(self.faces)).astype(np.int64)
@@ -84,16 +84,19 @@ class Chain(Frozen):
 
     @cached_property
     def complexes(self) -> Ints:
-        """(m,) component of each triangle; edges connect any number of triangles."""
+        """(m,) component of each triangle, connected by edges of any number of triangles."""
         return element_components(self.edges.face_edges) if len(self.faces) else np.zeros(0, dtype=np.int64)
 
     def open_edges(self, counts: Ints, groups: Ints) -> Ints:
-        """(g,) number of directed edges of each group of triangles that do not cancel, with multiplicity."""
+        """(g,) number of directed edges that do not cancel in each group, if triangles are there `counts` times.
+
+        Both `counts` and `groups` are (m,).
+        """
         owners, _, excess = self.edges.unbalanced(groups, counts)
         return np.bincount(owners, np.abs(excess), int(groups.max(initial=-1)) + 1).astype(np.int64)
 
     def joined(self, used: Bools) -> Ints:
-        """(m,) component of each triangle; edges of two used triangles connect."""
+        """(m,) component of each triangle, connected by edges that exactly two `used` triangles share."""
         heads = np.roll(self.faces, -1, axis=1).ravel()
         pairs = pair_halfedges(self.faces.ravel(), heads, len(self.positions), np.repeat(used, 3))
         two = pairs.counts == 2
@@ -102,8 +105,8 @@ class Chain(Frozen):
     def around_edges(self, used: Bools) -> tuple[Ints, Ints, Ints]:
         """Find (k,) halfedges 3 f + c of used triangles, the next one around the edge of each, and the edge's number.
 
-        A halfedge at a rim is followed by itself. Triangles at one angle are stacked piece by piece, the same way at
-        all of their edges. Edges of triangles without area are left out.
+        A boundary halfedge is followed by itself. Triangles at the same angle are ordered by component, in the same
+        order at all of their edges. Edges of triangles without area are left out.
         """
         tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         pairs = pair_halfedges(tails, heads, len(self.positions), np.repeat(used, 3))
@@ -135,34 +138,38 @@ class Chain(Frozen):
         )
 
     def neighbors(self, used: Bools) -> tuple[Ints, Ints]:
-        """(k,) halfedges and (k,) those that follow them around edges of two, four, ... used triangles.
+        """(k,) halfedges and (k,) the next ones around their edges, for edges of two, four, ... used triangles.
 
-        The winding number returns around an edge, so that neighbours run opposite ways if their number is even.
+        Only at those can all successive triangles face opposite ways, since the changes of the winding number around
+        an edge add up to 0.
         """
         one, other, edges = self.around_edges(used)
         even = (np.bincount(edges, one != other) % 2 == 0)[edges] & (one != other)
         return one[even], other[even]
 
     def agreeing_as_indexed(self) -> FaceOrientation:
-        """Turn given triangles so that those agree that share an edge, by index, with no third one.
+        """Orient given triangles consistently across edges that exactly two share, with the vertices as indexed.
 
-        Bodies that touch have vertices of their own where they meet, so that each agrees by itself.
+        Bodies that touch often have vertices of their own where they meet, so that each is oriented by itself.
         """
         return orient_faces(self.given, np.append(self.areas, 0.0)[self.numbers], len(self.positions))
 
     def outwards_as_indexed(self, reversed: Bools) -> Bools:
-        """(k,) which given triangles are reversed once no part, connected by index, encloses a negative volume."""
-        turned = (reversed != self.reversed)[:, None]
-        parts, volumes = part_volumes(self.positions, np.where(turned, self.given[:, ::-1], self.given))
+        """(k,) `reversed`, negated in each part, connected by index, that encloses a negative volume with it."""
+        flipped = (reversed != self.reversed)[:, None]
+        parts, volumes = part_volumes(self.positions, np.where(flipped, self.given[:, ::-1], self.given))
         return np.asarray(reversed != (volumes < 0)[parts])
 
     def agreeing(self, used: Bools) -> FaceOrientation:
-        """Turn triangles so that those agree that share an edge with no third one."""
+        """Orient distinct triangles consistently across edges that exactly two `used` ones share."""
         return orient_faces(self.faces, self.areas * np.sign(self.multiplicities), len(self.positions), used)
 
 
 def _levels(gaps: Floats, onward: Ints, edges: Ints) -> Ints:
-    """(k,) numbers of angles around each edge, alike for equal ones, given the gap to the next one."""
+    """(k,) number of the angle of each halfedge around its edge, the same for angles that differ by rounding only.
+
+    `gaps` are the angles to the next halfedge, `onward` its index, and `edges` the edge of each, in sorted order.
+    """
     begins = np.empty(len(gaps), dtype=bool)
     begins[onward] = gaps > ANGLE_ROUNDING
     levels = np.cumsum(begins)

@@ -29,7 +29,7 @@ from .lids import Frame, Lid, frame_of, running_mean, vertex_normals
 from .rims import boundary, corners_of, loops, open_edges, turning
 
 STRIP_WIDTH = 0.25
-"""Width of the strip of surface around an opening that is sampled, relative to the opening's width."""
+"""Width of the strip of surface around an opening that is sampled, relative to the width of the opening."""
 SMOOTH_COSINE = 0.7
 """Edges are sharp if the cosine between the normals of their faces is below this. With 0.75 lids of ducks that were cut
 in two bulge farther, by a tenth of what they differ from flat ones."""
@@ -39,22 +39,24 @@ MOST_RIM_SAMPLES = 16384
 """Faces around a rim are divided into no more samples than this. If there are more faces, only every second, third and
 so on is sampled."""
 HALF_BENDING_DEPTH = 0.03
-"""The bend of a wall counts half if this is its depth, relative to the width of the strip."""
+"""Slopes of the surface count half if samples spread only this far across the rim, relative to the width of the strip,
+and less if they spread less far."""
 BEND_RATIO = 0.35
 """Ratio between how far a surface bends and how far it must bend to close its opening. A lid does not bend below this
 ratio, and is clamped above twice this ratio. On a ball the ratio is 1."""
 COVERED_DISTANCE = 0.25
-"""Faces run along a bent lid that are nearer to it than this, relative to its distance from the flat one."""
+"""Faces count as running along a bent lid if they are nearer to it than this, relative to its distance from the flat
+lid."""
 
 
 @dataclass(frozen=True, eq=False)
 class RimSamples:
-    """Samples of faces near a rim: (k, 3) positions, (k, 3) unit normals, (k,) areas and (k,) smooth patches."""
+    """Samples of faces near a rim."""
 
-    positions: Floats
-    normals: Floats
-    areas: Floats
-    patches: Ints
+    positions: Floats  # (k, 3)
+    normals: Floats  # (k, 3) unit normals of their faces
+    areas: Floats  # (k,) area that each stands for
+    patches: Ints  # (k,) smooth patch of each
 
 
 def width_of(lid: Lid) -> float:
@@ -66,11 +68,14 @@ def width_of(lid: Lid) -> float:
 
 
 def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: PointTree, reach: float) -> RimSamples:
-    """Sample the triangles within reach of a rim, at most reach / `STRIP_SAMPLES` apart unless these are too many."""
+    """Sample (m, 3, 3) triangles within reach of a rim, at most reach / `STRIP_SAMPLES` apart unless that are too many.
+
+    `patches` are the (m,) patches of triangles, `tree` is one of their boxes, and `rim` one of points on the rim.
+    """
     size = reach / STRIP_SAMPLES
     near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
     triangles, patches = triangles[near_rim], patches[near_rim]
-    near, labels, count = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
+    parts, labels, count = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
     while len(triangles):
         centres = triangles.mean(axis=1)
         radii = np.linalg.norm(triangles - centres[:, None], axis=2).max(axis=1)
@@ -80,13 +85,13 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: PointTree
         fine |= count + 4 * int((~fine).sum()) > MOST_RIM_SAMPLES
         chosen = fine & (away < reach)
         count += int(chosen.sum())
-        near.append(triangles[chosen])
+        parts.append(triangles[chosen])
         labels.append(patches[chosen])
         a, b, c = triangles[~fine].transpose(1, 0, 2)
         d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2
         triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
         patches = np.tile(patches[~fine], 4)
-    pieces = np.concatenate(near)
+    pieces = np.concatenate(parts)
     vectors, areas = area_vectors(pieces), face_areas(pieces)
     proper = np.flatnonzero(areas > 0)
     proper = proper[:: max(1, len(proper) // MOST_RIM_SAMPLES)]
@@ -97,8 +102,10 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: PointTree
 def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> tuple[Floats, Floats, Floats]:
     """Estimate how a surface continues beyond its rim: (n, 3) normals, (n,) curvatures, and (n,) weights of both.
 
-    A surface that meets the flat lid of an opening of width W at angle β must turn by 2 sin β to cross the opening.
-    With its curvature k it would turn by k W. On a ball the two are equal, on a box k is 0.
+    `lid` is the flat lid, `patches` are the (n,) patches that end at the edges of its rim, and `width` is that of the
+    opening. A surface that meets the flat lid of an opening of width W at angle β must bend by 2 sin β to cross the
+    opening. With its curvature k it would bend by k W. On a ball the two are equal, on a box k is 0. Weights rise with
+    their ratio from 0 to 1.
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
     reach = STRIP_WIDTH * width
@@ -113,7 +120,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     middle, places = means @ samples.normals, means @ positions
 
     def covariance(values: Floats) -> Floats:
-        """(n, 3, 3) mean products of positions and values near each place, less the products of their means."""
+        """(n, 3, 3) covariances of positions and (k, 3) values over the samples near each point of the rim."""
         products = means @ (positions[:, :, None] * values[:, None]).reshape(-1, 9)
         return products.reshape(-1, 3, 3) - places[:, :, None] * (means @ values)[:, None]
 
@@ -140,7 +147,10 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
 
 
 def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Pair each place of a rim with the samples within reach that belong to the patch ending there; and distances."""
+    """Pair the (n, 3) points of a loop with samples within reach, of the patch that ends there.
+
+    Return (p,) points, (p,) samples and (p,) distances.
+    """
     rim, near = PointTree(loop), PointTree(samples.positions)
     pairs = rim.sparse_distance_matrix(near, reach, output_type="ndarray")
     pairs = pairs[samples.patches[pairs["j"]] == patches[pairs["i"]]]
@@ -148,27 +158,30 @@ def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> t
 
 
 LOST_FACE_SIDES = 16
-"""Holes with up to this many sides are closed by triangles between their vertices: larger ones may have lost vertices,
+"""Holes with up to this many sides are closed by triangles between their vertices. Larger ones may have lost vertices,
 too."""
 LARGEST_BEND = np.deg2rad(70.0)
-"""A lid continues the surface if the root mean square of the angles at the rim is below this. At the end of a tube it
-is 90°."""
+"""Triangles continue the surface if the root mean square of the angles at the rim is below this. At the end of a tube
+it is 90°."""
 
 
 def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints, most: float) -> list[Ints]:
-    """Fill each loop of n vertices by (n − 2, 3) triangles of least bend, or none if the bend at its rim is too large.
+    """Fill each loop of n vertices by (n − 2, 3) triangles of least bend, or by none if it bends too much.
 
-    `most` is the largest bend. Loops run counterclockwise as seen from outside. `normals` are those of the faces behind
-    their edges, loop by loop. No diagonal is one of the edges whose sorted `edge_keys` are `taken`.
+    `most` is the largest bend at the rim, see `LARGEST_BEND`. Loops run counterclockwise as seen from outside.
+    `normals` are those of the faces behind their edges, loop by loop. Diagonals must not be edges of the mesh, whose
+    sorted `edge_keys` are `taken`.
     """
     starts = np.concatenate([[0], np.cumsum([len(loop) for loop in loops], dtype=np.int64)])
     if not len(loops):
         return []
-    every = np.concatenate(loops)
-    faces, closed = _least_bent(vertices[every], every, np.ascontiguousarray(normals), starts, taken, most)
+    all_vertices = np.concatenate(loops)
+    faces, closed = _least_bent(
+        vertices[all_vertices], all_vertices, np.ascontiguousarray(normals), starts, taken, most
+    )
     begins = starts - 2 * np.arange(len(starts))
     return [
-        every[a + faces[b:c]] if closes else np.empty((0, 3), dtype=np.int64)
+        all_vertices[a + faces[b:c]] if closes else np.empty((0, 3), dtype=np.int64)
         for a, b, c, closes in zip(starts[:-1], begins[:-1], begins[1:], closed.tolist(), strict=True)
     ]
 
@@ -177,10 +190,11 @@ def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints
 def _least_bent(
     corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
 ) -> tuple[Ints, Bools]:
-    """Return triangles, as positions in their loops, and whether the bend at each rim is at most `most`.
+    """Return triangles, as indices into their loops, and whether the bend at each rim is at most `most`.
 
-    `cost[i, j]` is the bend of the best lid between corners i and j, and `rims[i, j]` the sum of lengths times squared
-    angles where this lid meets the rim.
+    Corners, ids of vertices and normals are given loop by loop; loops begin at `starts`. In the body, `cost[i, j]` is
+    the bend of the best lid between corners i and j, and `rims[i, j]` the sum of lengths times squared angles where
+    this lid meets the rim.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)
@@ -246,7 +260,7 @@ def _length(a: Floats, b: Floats) -> float:
 
 @compiled
 def _normal(a: Floats, b: Floats, c: Floats, normal: Floats) -> None:
-    """Write the unit normal of a triangle; 0 if it has no area."""
+    """Write the unit normal of the triangle with corners a, b and c to `normal`; 0 if it has no area."""
     ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -264,15 +278,15 @@ def _angle(a: Floats, b: Floats) -> float:
 
 
 NO_EDGES = np.empty((0, 2), dtype=np.int64)
-"""No edges."""
+"""An empty array of edges."""
 
 
 def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Ints = NO_EDGES) -> tuple[Floats, Ints]:
-    """Close the boundary of (m, 3) triangles; return all vertices, and (p, 3) new triangles, which balance each edge.
+    """Close the boundary of (m, 3) triangles; return all vertices, given and new, and (p, 3) new triangles.
 
     Small holes are filled by triangles between their corners, and rims that run along each other are joined by strips.
-    Other loops get lids: `bent` ones, flat faces that meet in creases, or films. Loops that consist of `outlines`,
-    (k, 2) edges, stay open.
+    Other loops get lids that continue the curvature of the surface if `bent`, or else lids of flat faces or of nearly
+    least area. Boundary edges among `outlines`, (k, 2), stay open.
     """
     faces = np.asarray(faces, dtype=np.int64)
     if len(boundary(faces)) == len(outlines):
@@ -298,15 +312,15 @@ def closed_by(vertices: Floats, faces: Ints, *, bent: bool = True, outlines: Int
 
 @dataclass(frozen=True, eq=False)
 class _Surface(Frozen):
-    """A chain of triangles, with cached properties for closing its boundary."""
+    """Triangles with cached properties for closing their boundary."""
 
-    vertices: Floats
-    faces: Ints
+    vertices: Floats  # (n, 3)
+    faces: Ints  # (m, 3)
     outlines: Ints = field(default_factory=lambda: NO_EDGES)
 
     @cached_property
     def loops(self) -> list[Ints]:
-        """Closed loops around the gaps to close."""
+        """Vertices of each closed loop of boundary edges that are not outlines."""
         edges, n = boundary(self.faces), len(self.vertices)
         keys, left = edges @ [n, 1], np.sort(self.outlines @ [n, 1])
         order, copies = np.argsort(keys, kind="stable"), np.arange(len(left)) - np.searchsorted(left, left)
@@ -330,7 +344,7 @@ class _Surface(Frozen):
 
     @cached_property
     def normals(self) -> Floats:
-        """(m, 3) unit normals; triangles without area, up to rounding, have that of a neighbour, of the largest one."""
+        """(m, 3) unit normals; triangles without area, up to rounding, get that of their largest neighbour."""
         normals = unit(area_vectors(self.triangles))
         normals[self.areas <= ANGLE_ROUNDING * side_lengths(self.triangles).max(axis=1) ** 2] = 0.0
         first, second = np.concatenate([self.edges.pairs, self.edges.pairs[:, ::-1]]).T // 3
@@ -344,19 +358,19 @@ class _Surface(Frozen):
 
     @cached_property
     def parts(self) -> Ints:
-        """(m,) component of each face; shared edges connect faces."""
+        """(m,) component of each face, connected by shared edges."""
         return element_components(self.edges.face_edges)
 
     @cached_property
     def patches(self) -> Ints:
-        """(m,) component of each face; edges that are not sharp connect faces."""
+        """(m,) smooth patch of each face, connected by edges that are not sharp."""
         first, second = self.edges.pairs.T // 3
         smooth = (self.normals[first] * self.normals[second]).sum(axis=1) > SMOOTH_COSINE
         return connected_components(len(self.faces), first[smooth], second[smooth])
 
     @cached_property
     def bends(self) -> Bools:
-        """(p,) whether the normals in each patch differ by more than rounding."""
+        """(p,) whether each patch is curved: its normals differ by more than rounding."""
         first = self.normals[first_members(self.patches, int(self.patches.max()) + 1)]
         off = np.abs(self.normals - first[self.patches]).max(axis=1) > ANGLE_ROUNDING
         return mask_of(len(first), self.patches[off])
@@ -368,7 +382,10 @@ class _Surface(Frozen):
 
     @cached_property
     def _sides(self) -> tuple[Ints, Ints]:
-        """Sorted keys of directed sides, and the sides; among equal keys the one that `behind` prefers comes first."""
+        """(3 m,) sorted keys of directed sides, and (3 m,) these sides, 3 f + c.
+
+        Among sides with the same key, the first is of an open piece if possible, and of the largest face.
+        """
         keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
         pieces = connected_components(len(self.faces), *self.edges.pairs.T // 3)
         closed = ~np.isin(pieces, open_edges(self.faces, pieces)[1])
@@ -376,14 +393,14 @@ class _Surface(Frozen):
         return keys[order], order
 
     def behind(self, tails: Ints, heads: Ints) -> tuple[Ints, Ints]:
-        """Return the (n,) faces behind edges of loops, of open pieces if possible, and their third vertices."""
+        """(n,) faces behind the edges of loops from (n,) tails to heads, and (n,) the third vertices of these faces."""
         keys, order = self._sides
         face, side = np.divmod(order[np.searchsorted(keys, heads * len(self.vertices) + tails)], 3)
         return face, self.faces[face, (side + 2) % 3]
 
 
 def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints = NO_EDGES) -> Ints:
-    """Fill small holes if lids are `bent`, and gaps without area, by (k, 3) triangles between their vertices."""
+    """(k, 3) triangles that fill gaps without area, and if `bent` small holes, between their vertices."""
     surface = _Surface(vertices, faces, outlines)
     if not surface.loops:
         return np.empty((0, 3), dtype=np.int64)
@@ -420,7 +437,7 @@ def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints 
 
 
 def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
-    """Divide the triangles of a lid, which join the corners of a loop, at the other points of the loop."""
+    """Divide the (k, 3) triangles of a lid between corners of a loop, at indices `places`, at its other points."""
     for begin, end in zip(places, [*places[1:], places[0] + len(loop)], strict=True):
         side = loop[np.arange(begin, end + 1) % len(loop)]
         if len(side) > 2:
@@ -431,12 +448,12 @@ def _with_sides(loop: Ints, places: Ints, lid: Ints) -> Ints:
 
 
 def fan(points: Ints) -> Ints:
-    """(k − 2, 3) triangles from the first of k points to the others."""
+    """(k − 2, 3) triangles from the first of k points to each pair of successive others."""
     return np.stack([np.full(len(points) - 2, points[0]), points[1:-1], points[2:]], axis=1)
 
 
 def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
-    """Join rims that run along each other, in part or all around, by (k, 3) triangles."""
+    """(k, 3) triangles of strips between boundary loops that run along each other, in part or all around."""
     surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
     surface = _Surface(vertices, chain, outlines)
@@ -447,7 +464,7 @@ def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
 
 
 def _rims(surface: _Surface) -> list[walls.Rim]:
-    """List the rims of parts with more than one face."""
+    """List the boundary loops, except those with edges of single triangles."""
     if not surface.loops:
         return []
     counts = np.bincount(surface.parts)
@@ -461,7 +478,7 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
 
 
 def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
-    """Make the lid of a loop: the points added to those of the loop, and triangles."""
+    """Make the lid of a loop of n vertices: (k, 3) added points, and triangles; indices from n on are added points."""
     corners = surface.vertices[loop]
     if len(loop) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
@@ -476,7 +493,11 @@ def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
 
 
 def _of_flat_faces(corners: Floats, normals: Floats, bent: bool) -> tuple[Floats, Ints] | None:
-    """Make the lid of a loop of flat faces, or of its corners alone if these are few and lids may be bent."""
+    """Make a lid of flat faces, or, if it has few corners and may be bent, of triangles between them; None if neither.
+
+    `corners` are the (n, 3) points of the loop, `normals` those of the faces behind its edges. It returns what `_lid`
+    does.
+    """
     lid = lids.creased(corners, normals)
     if lid is not None:
         return lid
@@ -492,7 +513,11 @@ def _of_flat_faces(corners: Floats, normals: Floats, bent: bool) -> tuple[Floats
 def _spanned(
     surface: _Surface, loop: Ints, behind: Ints, frame: Frame | None, bends: bool
 ) -> tuple[Floats, Ints] | None:
-    """Make the lid of a loop, triangulated in a plane or in a disc; None if the loop crosses itself there."""
+    """Make the lid of a loop, triangulated in the plane `frame`, or in a disc without one: see `_lid`.
+
+    None if the loop crosses itself there. `behind` are the faces behind the edges of the loop; the lid is curved if
+    `bends`.
+    """
     corners = surface.vertices[loop]
     rim = lids.SmoothRim.of(corners)
     smooth = lids.pattern(rim, frame)
@@ -503,7 +528,7 @@ def _spanned(
     if bends:
         width, points = width_of(flat), flat.vertices[: flat.n_rim]
         near = samples_near(surface.triangles, surface.tree, surface.patches, PointTree(points), STRIP_WIDTH * width)
-        ends = surface.patches[behind[rim.edges_at(flat.places)]]
+        ends = surface.patches[behind[rim.edges_at(flat.shares)]]
         normals, curvatures, held = continuation(flat, near, ends, width)
         plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
         if plate is not None and _is_covered(surface, plate, flat):
@@ -514,7 +539,7 @@ def _spanned(
 
 
 def _is_covered(surface: _Surface, bent: Lid, flat: Lid) -> bool:
-    """Whether faces run along most of a bent lid, as of another half shell: nothing is missing where it bends."""
+    """Whether faces of the surface run along most of a bent lid, so that nothing is missing there."""
     lid = bent.vertices[bent.faces]
     centres, areas = lid.mean(axis=1), face_areas(lid)
     heights = np.linalg.norm(centres - flat.vertices[flat.faces].mean(axis=1), axis=1)

@@ -1,6 +1,6 @@
 """Complete a broken shape: decide which faces bound it, and close it where it is open.
 
-Seams join the borders of a level set to the rims of faces that it completes.
+Seams join the boundary of a part of a level set to the boundary of the faces that it completes.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ from .winding import Windings
 
 
 def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
-    """Divide the rims of faces by (k, 3) points, at most a step apart, and join them to the borders of patches.
+    """Join the boundary of faces, divided by points at most `step` apart, to the boundary of patches.
 
-    Returns these points and the (m, 3) triangles of the seams.
+    Return these (k, 3) points, which are numbered after the vertices, and the (m, 3) triangles of the seams.
     """
     rim, (tails, heads) = boundary(faces), boundary(patches).T
     starts, ways = vertices[rim[:, 0]], vertices[rim[:, 1]] - vertices[rim[:, 0]]
@@ -61,14 +61,14 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
     edges, number = numbered(counts)
     shares = (number + 1) / (counts[edges] + 1)
     points = starts[edges] + shares[:, None] * ways[edges]
-    names = len(vertices) + np.arange(len(points))
+    ids = len(vertices) + np.arange(len(points))
     last = np.append(edges[1:] != edges[:-1], True)[: len(edges)]
-    onward = np.where(last, rim[edges, 1], names + 1)
-    slivers = np.stack([rim[edges, 0], onward, names], axis=1)
-    places = np.concatenate([vertices, points])
-    ends, border = np.append(np.unique(rim), names), np.unique(tails)
+    onward = np.where(last, rim[edges, 1], ids + 1)
+    slivers = np.stack([rim[edges, 0], onward, ids], axis=1)
+    all_points = np.concatenate([vertices, points])
+    ends, border = np.append(np.unique(rim), ids), np.unique(tails)
     nearest = np.zeros(len(vertices), dtype=np.int64)
-    nearest[border] = ends[PointTree(places[ends]).query(vertices[border])[1]]
+    nearest[border] = ends[PointTree(all_points[ends]).query(vertices[border])[1]]
     strip = np.concatenate(
         [np.stack([tails, heads, nearest[heads]], axis=1), np.stack([tails, nearest[heads], nearest[tails]], axis=1)]
     )
@@ -77,7 +77,7 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
 
 
 def small_gaps(vertices: Floats, faces: Ints) -> Ints:
-    """(k, 3) triangles that fill the small gaps that seams leave."""
+    """(k, 3) triangles that fill boundary loops of at most `LOST_FACE_SIDES` vertices, which seams leave."""
     around = [loop for loop in loops(vertices, faces, boundary(faces)) if len(loop) <= LOST_FACE_SIDES]
     return np.concatenate([np.empty((0, 3), dtype=np.int64), *map(fan, around)])
 
@@ -87,29 +87,29 @@ BYTES_PER_COMPLETED_FACE = 1400
 BYTES_PER_LOOSE_FACE, BYTES_OF_HEAT = 3400, 150_000_000
 """Peak memory per loose triangle; and memory of the grid on which loose triangles and points are completed."""
 CELLS_PER_POINT_GAP = 2.0
-"""Number of cells between neighbouring points of a cloud."""
+"""Number of grid cells between neighbouring points of a cloud."""
 NOISE_RANGE = (1e-6, 0.75)
 """Range of distances between corners that noise has separated, relative to the square root of their triangle's area."""
 CELLS_PER_FACE = 8.0
-"""Cells of the zero set of φ are at least as wide as the loose faces over this number. With 16 or 32, volumes of four
-soups of 80 to 1280 faces change by 0.02 %, and there are up to four times as many faces; with 4, by 0.16 %."""
+"""Cells of the zero set of φ are at least as wide as loose faces divided by this. With 16 or 32, volumes of four soups
+of 80 to 1280 faces change by 0.02 %, and there are up to four times as many faces; with 4, by 0.16 %."""
 TORN_LEVEL = 0.2
-"""Loose pieces are completed by heat below this level, where a fifth to two fifths of a body are left, else by lids,
-which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids enclose 0.1 % too little and
-heat 0.3 % too much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
+"""Loose pieces with a level below this, where a fifth to two fifths of a body are left, are completed by the signed
+heat method, others by lids, which keep to the faces. For balls, tori and a cow without 45 % of their triangles, lids
+enclose 0.1 % too little and heat 0.3 % too much; without 65 %, lids miss 1 to 12 % and heat 1 %."""
 ZERO_SET_FACES = 0.75
-"""Triangles of the zero set of φ are left out within this distance of faces, in cells: they stand for these faces. With
-0.5 distance to balls, tori and ducks without three tenths of their triangles is 5 to 10 % worse."""
+"""Triangles of the zero set of φ within this distance of given faces, in cells, are left out, since those are there.
+With 0.5 distance to balls, tori and ducks without three tenths of their triangles is 5 to 10 % worse."""
 
 MOSTLY_GIVEN = 0.25
-"""Where more than this share of the surface is completed, a warning says so."""
+"""If more than this share of the surface is completed, there is a warning."""
 
 CLEAR_WINDING, EVIDENCE_PLACES = 0.9, 1000
-"""Winding numbers of faces say clearly what is inside above this, and what is outside below one minus this; and number
-of places in the box of a solid at which they are asked."""
+"""Winding numbers of faces above the first, or below one minus this, are clear evidence of what is inside. They are
+evaluated at as many random points in the box of a solid as the second says."""
 MOST_OVERRULED = 0.02
-"""Where the completion overrules clear winding numbers at more than this share of the places, a warning says so. Of 570
-shapes that were changed a little, the most is 0.01; a bowl that is closed as a hollow ball has 0.04."""
+"""If the completion contradicts clear winding numbers at more than this share of those points, there is a warning. Of
+570 shapes that were changed a little, the most is 0.01; a bowl that is closed as a hollow ball has 0.04."""
 
 Completing = Literal["lids", "heat", "none"]
 Lids = Literal["bent", "flat"]
@@ -154,21 +154,22 @@ def complete(
 ) -> Solid:
     """Complete a shape to the solid it represents, broken or not.
 
-    Faces are flipped to agree and to face outwards. Parts that enclose a volume are closed by lids, patches that
-    continue the curvature of the surface around a hole. Points, and loose triangles that scatter around a surface, are
-    completed by the signed heat method. Bodies that overlap are united. Open sheets enclose nothing: distance to them
-    is positive on both sides. The result does not depend on where distance is wanted, nor on rotation, position and
-    scale.
+    Faces are flipped to be consistent and to face outwards. Parts that enclose a volume are closed by lids, which are
+    patches that continue the curvature of the surface around a hole. Points, and loose triangles that scatter around a
+    surface, are completed by the signed heat method. Bodies that overlap are united. Open sheets enclose nothing, and
+    distance to them is positive on both sides. The result does not depend on where distance is evaluated, nor on
+    rotation, position and scale.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud or TetMesh; or several meshes
-        A shape, broken or not; points may lack normals. Like every function that takes shapes, this takes objects of
-        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces). A `Solid` is returned unchanged,
-        whatever the options.
+        A shape, broken or not. Points may lack normals. Like every function that takes shapes, this takes objects of
+        trimesh, PyVista, meshio and Open3D and pairs (vertices, faces). A `Solid` is returned unchanged, whatever the
+        options.
     completion : {"lids", "heat", "none"}
-        Close meshes by lids, or by the zero set of φ where no face is, as in the paper (Feng & Crane 2024). With
-        "none", all faces are a sheet: distance is unsigned, and only to what is there, as for clothes.
+        Close meshes by lids; or, where there are no faces, by the zero set of φ, the field of the signed heat method
+        (Feng & Crane 2024). With "none", nothing is added: all faces are a sheet, and distance is unsigned, as for
+        clothes.
     lids : {"bent", "flat"}
         Whether lids continue the curvature of the surface, or are flat, as for half models, ducts and hulls.
     as_oriented : bool
@@ -176,23 +177,23 @@ def complete(
     keep_overlaps : bool
         Keep surfaces that lie inside other bodies.
     nested : {"given", "cavities", "bodies"}
-        What bodies within others are. With "given", bodies or cavities, by their orientation. With "cavities",
-        cavities, and bodies inside those, as in slicers. With "bodies", always bodies.
+        Whether closed parts within others are bodies or cavities. With "given", that depends on their orientation. With
+        "cavities", they are cavities, and parts within these are bodies, as in slicers. With "bodies", all are bodies.
     seal : float, optional
-        Make solid: seal openings of meshes narrower than this length, to about a sixth of it, and fill what lies behind
-        them. Of double skins, leaks, bodies within and rubbish, only what is reached from outside is left, unchanged.
-        In the units of the shape, as all lengths.
+        Seal openings of meshes that are narrower than this length, to about a sixth of it, and fill what lies behind
+        them. Faces that are not reached from outside through wider openings, such as inner skins, are left out. In the
+        units of the shape, as all lengths.
     smallest : float, optional
         Leave out the connected parts of meshes that fit into a box whose diagonal is shorter than this length.
     constraint, diffusion : Constraint, float
-        Options of the signed heat method, where that completes.
+        Options of the signed heat method, where the shape is completed by it; see `SignedHeatSolver`.
     progress : callable, optional
         Called as ``progress(fraction, step)``, ten times a second. An exception that it raises cancels.
 
     Returns
     -------
     Solid
-        Its ``diagnostics.notes`` say which faces were flipped, left out and added.
+        The completed shape. Its ``diagnostics.notes`` say which faces were flipped, left out and added.
 
     Raises
     ------
@@ -206,8 +207,8 @@ def complete(
     Warns
     -----
     InexactWarning
-        If more than a quarter of the surface of a mesh is completed: what is missing is a guess. Also if the completion
-        contradicts what the winding numbers of the faces say clearly.
+        If more than a quarter of the surface of a mesh is completed, since it is then a guess. Also if the completion
+        contradicts clear winding numbers of the faces.
 
     See Also
     --------
@@ -232,7 +233,7 @@ def complete(
 def completed(
     shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
 ) -> Solid:
-    """Complete a shape, see `complete`; a solid is returned as it is."""
+    """Complete a shape with checked options, see `complete`; return a solid as it is."""
     if isinstance(method.constraint, EachComponent | LevelValues):
         raise ConstraintError(
             f"distance to a shape is zero on all of it, which {method.constraint!r} denies",
@@ -295,7 +296,7 @@ def completed(
 
 
 def _sheet(shape: SurfaceShape) -> Solid:
-    """Take all faces of a mesh as they are, as a sheet, which bounds nothing."""
+    """Make a solid of all faces of a mesh as a sheet, which bounds nothing."""
     if isinstance(shape, PointCloud):
         raise SourceError(
             "points are no sheet: what lies between them is completed",
@@ -312,7 +313,7 @@ def _sheet(shape: SurfaceShape) -> Solid:
 
 
 def large_parts(mesh: TriangleMesh, smallest: float) -> tuple[TriangleMesh, Ints, SmallParts]:
-    """Return the connected parts of a mesh that are not small, their (k,) faces, and what was left out."""
+    """Return the connected parts of a mesh at least `smallest` in size, their (k,) faces, and a note on the others."""
     parts, sizes = parts_by_place(mesh.vertices, mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel())
     small = sizes < smallest
     kept = np.flatnonzero(~small[parts[::3]])
@@ -336,7 +337,10 @@ def _completed_instead(
     method: Heat,
     progress: Progress | None,
 ) -> Solid:
-    """Complete a mesh in place of a shape, given the triangle of the shape that each of its faces is part of."""
+    """Complete a mesh made of a shape; `cut_from` are the triangles of the shape that its faces are parts of.
+
+    In the result, source and origins refer to the shape, and `note` comes first in the diagnostics.
+    """
     solid = completed(mesh, options, method, progress)
     origins = np.where(solid.origins >= 0, owners_of(shape)[cut_from][solid.origins], -1)
     diagnostics = replace(solid.diagnostics, notes=(note, *solid.diagnostics.notes))
@@ -345,7 +349,10 @@ def _completed_instead(
 
 
 def _with_whole_boundary(solid: Solid, mesh: TriangleMesh) -> Solid:
-    """Replace the triangles that bound the solid of a mesh where the cut of its chain is not proven to bound it."""
+    """Replace the bounding triangles of a solid by ones that are proven to bound it, if they were cut; see `bodies`.
+
+    The solid is returned as it is if no such triangles are found. `mesh` is the mesh that it was made of.
+    """
     cut = solid.triangles[solid.bounding]
     if np.array_equal(cut, solid.windings.triangles):
         return solid
@@ -386,9 +393,10 @@ def bytes_to_complete(shape: SurfaceShape, count: int) -> float:
 
 
 def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Completion, method: Heat) -> Solid:
-    """Make the solid of a mesh, given what its distinct triangles bound: heat completes torn bodies, lids others.
+    """Make the solid of a mesh, as was decided for its chain: heat completes torn bodies, and lids complete others.
 
-    A body is torn if its loose triangles scatter, or if little of it is left. The option "heat" takes all faces as one.
+    A body is torn if its loose triangles scatter, or if little of it is left. With the option "heat", all faces are one
+    torn body.
     """
     vertices = mesh.vertices
     counts = np.abs(decided.counts)
@@ -423,35 +431,39 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 
 
 def overruled(solid: Solid, triangles: Floats) -> float:
-    """Return the share of the box of a solid where the (m, 3, 3) faces that bound it clearly say the opposite."""
+    """Return the share of the box of a solid in which winding numbers of (m, 3, 3) faces clearly contradict it."""
     lower, upper = solid.bounds
-    places = lower + np.random.default_rng(0).random((EVIDENCE_PLACES, 3)) * (upper - lower)
-    windings, inside = WindingTree.of(triangles).numbers(places), solid.inside(places)
+    points = lower + np.random.default_rng(0).random((EVIDENCE_PLACES, 3)) * (upper - lower)
+    windings, inside = WindingTree.of(triangles).numbers(points), solid.inside(points)
     return float(np.where(inside, windings < 1 - CLEAR_WINDING, windings > CLEAR_WINDING).mean())
 
 
 def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) -> tuple[TriangleGroup, list[Note]]:
-    """Close (m, 3) faces with (m,) origins by lids; note how many lost faces between given vertices were restored."""
+    """Close (m, 3) faces with (m,) origins by lids; return all triangles, and a note if small holes were filled."""
     lost = small_lids(vertices, faces, bent)
     restored = np.concatenate([faces, lost])
-    places, added = closed_by(vertices, restored, bent=bent)
-    surface = _made_from(places, restored, added, origins)
+    vertices_with_new, added = closed_by(vertices, restored, bent=bent)
+    surface = _closed_group(vertices_with_new, restored, added, origins)
     if not len(lost):
         return surface, []
     area_lost, area_given = (float(face_areas(vertices[part]).sum()) for part in (lost, faces))
     return surface, [FacesRestored(len(lost), area_lost / (area_lost + area_given))]
 
 
-def _made_from(places: Floats, faces: Ints, added: Ints, origins: Ints) -> TriangleGroup:
-    """Make a closed surface of given and added faces. Only given faces have origins."""
+def _closed_group(vertices: Floats, faces: Ints, added: Ints, origins: Ints) -> TriangleGroup:
+    """Make a closed surface of faces with (k,) origins, which are the first k of all, and of others without."""
     whole = np.concatenate([faces, added])
-    return TriangleGroup(places[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
+    return TriangleGroup(vertices[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 
 
 def _completed_by_heat(
     vertices: Floats, faces: Ints, origins: Ints, scatter: float, method: Heat
 ) -> list[TriangleGroup]:
-    """Complete a torn body by the zero set of φ, which replaces the faces if they scatter (`scatter` > 0)."""
+    """Complete a torn body by the zero set of φ.
+
+    It replaces the faces if they scatter; `scatter` is their distance from a surface, or 0 if they do not. Otherwise it
+    is used away from the (m, 3) faces, which keep their origins.
+    """
     triangles = vertices[faces]
     given = TriangleGroup(triangles, faces, origins, False)
     made = heat_surface(TriangleMesh(*indexed(triangles)), method, scatter)
@@ -462,22 +474,23 @@ def _completed_by_heat(
     tree = FaceTree.of_triangles(triangles)
     patches = made[0][made[1]]
     cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
-    away = tree.distances(patches.mean(axis=1)) > ZERO_SET_FACES * cell
+    is_away = tree.distances(patches.mean(axis=1)) > ZERO_SET_FACES * cell
     if not len(boundary(faces)):
         return [replace(given, closing=True)]
-    places = np.concatenate([vertices, made[0]])
-    others = made[1][away] + len(vertices)
-    points, joins = seam_triangles(places, faces, others, cell)
-    places, whole = np.concatenate([places, points]), np.concatenate([faces, others, joins])
-    whole = np.concatenate([whole, small_gaps(places, whole)])
-    places, added = closed_by(places, whole)
-    return [_made_from(places, whole, added, origins)]
+    all_vertices = np.concatenate([vertices, made[0]])
+    others = made[1][is_away] + len(vertices)
+    points, joins = seam_triangles(all_vertices, faces, others, cell)
+    all_vertices, whole = np.concatenate([all_vertices, points]), np.concatenate([faces, others, joins])
+    whole = np.concatenate([whole, small_gaps(all_vertices, whole)])
+    all_vertices, added = closed_by(all_vertices, whole)
+    return [_closed_group(all_vertices, whole, added, origins)]
 
 
 def scatter_of(triangles: Floats, labels: Ints) -> float:
-    """Return the median distance between corners that noise has separated; 0 if it has not separated most of them.
+    """Return the median distance between corners of (m, 3, 3) triangles that noise has separated; 0 if most are not.
 
-    It is at least the size of the faces over `CELLS_PER_FACE`: finer cells would show nothing more of them.
+    `labels` are the pieces of the triangles. The distance is at least the size of the faces over `CELLS_PER_FACE`,
+    since finer cells would not show more of them.
     """
     points = triangles.reshape(-1, 3)
     owners = np.repeat(labels, 3)

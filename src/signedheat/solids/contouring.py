@@ -48,20 +48,23 @@ from .offsets import Offset
 from .tiles import blocks_where, prepared, solved, tiles_of
 
 CREASE_TANGENT = 0.05
-"""Planes count as one if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by a
-hundredth of a cell at most. With 0.2 creases of 20° are lost; with 0.01 facets of smooth surfaces become creases."""
+"""Two planes make no crease if the tangent of half the angle between them is below this. Creases of 5.7° are cut off by
+a hundredth of a cell at most. With 0.2 creases of 20° are lost; with 0.01 facets of smooth surfaces become creases."""
 
 
 @dataclass(frozen=True, eq=False)
 class Quadrics:
-    """Quadratic error functions of n points, as sums over the planes of each."""
+    """Quadratic error functions of n vertices, each a sum over planes: see the module."""
 
-    products: Floats  # (n, 3, 3) A
-    sides: Floats  # (n, 3) b
+    products: Floats  # (n, 3, 3) matrices A
+    sides: Floats  # (n, 3) vectors b
 
     @classmethod
     def of(cls, owners: Ints, places: Floats, normals: Floats, count: int) -> Quadrics:
-        """Sum the planes of each owner, given by unit normals and by places on them, relative to the owner's centre."""
+        """Sum k planes by owner: (k,) `owners` from 0 to `count` − 1, and (k, 3) unit normals and points on the planes.
+
+        Points are relative to the centre of their owner.
+        """
         along = (normals * places).sum(axis=1)[:, None]
         products = sums_of(normals[:, :, None] * normals[:, None, :], owners, count)
         return cls(products, sums_of(normals * along, owners, count))
@@ -77,14 +80,14 @@ def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats
     """Return the (n, 3) points at which quadrics are least within boxes, and the (n,) ranks of their matrices A.
 
     A minimum outside of its box moves into it along the direction in which the error grows least, that of a crease. If
-    it cannot, the minimum on a wall is taken: on the wall that it is farthest beyond.
+    it cannot, it is the minimum on the wall of the box that it is farthest beyond. `lower` and `upper` are (n, 3).
     """
     values, vectors = np.linalg.eigh(quadrics.products)
     least = CREASE_TANGENT**2 * np.maximum(values[:, 2], 1e-300)
     ranks = (values > least[:, None]).sum(axis=1)
     points = _solved(values, vectors, quadrics.sides, least)
     points += _way_into(points, vectors[:, :, 0], lower, upper) * (ranks > 1)[:, None]
-    fixed, held = np.zeros(points.shape, dtype=bool), np.zeros_like(points)
+    fixed, fixed_values = np.zeros(points.shape, dtype=bool), np.zeros_like(points)
     for _ in range(3):
         beyond = np.where(fixed, 0.0, np.maximum(lower - points, points - upper))
         axis = beyond.argmax(axis=1)
@@ -93,16 +96,16 @@ def minimizers(quadrics: Quadrics, lower: Floats, upper: Floats) -> tuple[Floats
             break
         axis = axis[rows]
         fixed[rows, axis] = True
-        held[rows, axis] = np.clip(points[rows, axis], lower[rows, axis], upper[rows, axis])
+        fixed_values[rows, axis] = np.clip(points[rows, axis], lower[rows, axis], upper[rows, axis])
         free = ~fixed[rows]
         inner = quadrics.products[rows] * (free[:, :, None] & free[:, None, :])
-        sides = (quadrics.sides[rows] - np.einsum("nij,nj->ni", quadrics.products[rows], held[rows])) * free
-        points[rows] = _solved(*np.linalg.eigh(inner), sides, least[rows]) + held[rows]
+        sides = (quadrics.sides[rows] - np.einsum("nij,nj->ni", quadrics.products[rows], fixed_values[rows])) * free
+        points[rows] = _solved(*np.linalg.eigh(inner), sides, least[rows]) + fixed_values[rows]
     return np.clip(points, lower, upper), ranks
 
 
 def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Floats:
-    """Return the shortest moves along given directions into boxes; 0 where a line misses its box."""
+    """(n, 3) shortest moves of points along (n, 3) directions into their boxes; 0 where the line misses its box."""
     slow = np.where(np.abs(along) > 1e-12, along, 1e-12)
     first, second = (lower - points) / slow, (upper - points) / slow
     enter, leave = np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)
@@ -111,23 +114,23 @@ def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Fl
 
 
 def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Floats:
-    """Solve A x = b, given the eigenvalues and eigenvectors of A, without eigenvalues of at most `least`."""
+    """(n, 3) solutions of A x = b, by eigenvalues and eigenvectors of A, leaving out eigenvalues of at most `least`."""
     inverse = np.where(values > least[:, None], 1.0 / np.where(values > least[:, None], values, 1.0), 0.0)
     return np.einsum("nij,nj,nkj,nk->ni", vectors, inverse, vectors, sides, optimize=True)
 
 
 CELLS_AT_ONCE = 1 << 16
-"""Batch size for cells that the level passes through."""
+"""Batch size for cells that the surface passes through."""
 OUTSIDE_CELL = 0.6
 """Distance, in cells, by which a vertex may leave its cell."""
 VERTEX_SPACING = 0.2
-"""Least distance, in cells, between vertices that have left their cells."""
+"""Vertices that would leave their cells stay inside if another vertex is closer than this, in cells."""
 CHORD_ERROR = 0.02
-"""Distance from the level, in cells, above which an edge along a crease is divided."""
+"""An edge along a crease is divided if its midpoint is farther than this from the surface, in cells."""
 DIVISIONS = 6
 """Number of rounds in which edges are divided: the largest error on a bracket is 0.08 cells with three, 0.05 with 6."""
 CROSS_REACH = 4.0
-"""Distance from new vertices, in cells, within which triangles are checked for intersections."""
+"""Triangles within this distance of new vertices, in cells, are checked for intersections."""
 PROBE_OFFSETS = np.array(list(np.ndindex(2, 2, 2))) - 0.5
 """Offsets, in cells, of the points around a vertex on a crease at which further planes are looked for."""
 PROBE_SHARES = 0.1, 0.3, 0.6
@@ -144,11 +147,15 @@ class ImplicitSurface(Protocol):
         """(n,) distances from the surface, negative inside, and (n, 3) unit vectors along which they grow."""
 
     def planes(self, points: Floats, /) -> tuple[Floats, Floats]:
-        """(n, 3) places on the surface near points, and its normals there."""
+        """(n, 3) points on the surface near given ones, and (n, 3) unit normals there."""
 
 
 def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats) -> Floats:
-    """Return (3, v, 3) candidates for each piece's vertex, in cells: the best, the best in its cell, and its middle."""
+    """Return (3, v, 3) candidates for the vertex of each piece of the surface in a cell, as positions in cells.
+
+    They are the best one, the best inside the cell, and the middle of the piece. `points` are the (e, 3) points at
+    which the surface crosses edges of the grid.
+    """
     count = len(cells.owners)
     vertices, middles, wider = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     alone = np.bincount(cells.owners)[cells.owners] == 1
@@ -165,7 +172,10 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
 
 
 def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
-    """(v,) whether each vertex takes its wider candidate; if some are close together, the one that moves least."""
+    """(v,) which vertices may use their `wider` position, (v, 3) in cells, which may be NaN or outside of their cell.
+
+    Of positions outside of cells that are close together, only that which moved least is used.
+    """
     away = np.where(np.isnan(wider[:, 0]), np.inf, np.linalg.norm(wider - vertices, axis=1))
     in_cell: Bools = (np.floor(wider) == cells.places[cells.owners]).all(axis=1)
     rows = np.flatnonzero(np.isfinite(away) & ~in_cell)
@@ -188,10 +198,11 @@ def _vertices(
     crossed: Ints,
     points: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the (p, 3) vertices of pieces in their cells, the middles of pieces, and wider candidates or NaN.
+    """Return (p, 3) vertices of pieces of the surface in their cells, middles of pieces, and wider candidates or NaN.
 
-    Wider candidates lie up to `OUTSIDE_CELL` outside of their cells. The surface passes through edge `crossed[i]` in
-    piece `owners[i]`; `points`, (e, 3), are where it passes through each edge.
+    `places` are the (p, 3) cells of pieces, and `alone` tells whether a piece has its cell alone. Wider candidates lie
+    up to `OUTSIDE_CELL` outside of their cells. The surface crosses edge `crossed[i]` in piece `owners[i]`, and edge e
+    at `points[e]`.
     """
     count = len(places)
     step = float(grid.spacing.max())
@@ -232,7 +243,7 @@ def _vertices(
 def divided_along_creases(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints
 ) -> tuple[Floats, Ints]:
-    """Divide edges that cut off a crease of the level at points on it, unless triangles would then intersect."""
+    """Divide edges that cut off a crease of the surface at points on the crease, unless triangles would intersect."""
     new = np.ones(len(faces), dtype=bool)
     for _ in range(DIVISIONS if len(faces) <= MOST_CREASED_FACES else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
@@ -263,9 +274,9 @@ def divided_along_creases(
 def _creases_off(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints, new: Bools
 ) -> tuple[Ints, Floats]:
-    """Find bent edges that are off the level: their (k, 2) halfedges, and a point on the level for each, (k, 3).
+    """Find bent edges that are off the surface: their (k, 2) halfedges, and (k, 3) points on the surface near them.
 
-    Only edges of faces that are `new`, (m,), are checked. No two of the edges found share a face.
+    Only edges of faces that are `new`, (m,), are checked. No two of the edges share a face.
     """
     step = float(spacing.max())
     near = np.flatnonzero(mask_of(len(vertices), faces[new])[faces].any(axis=1))
@@ -295,29 +306,29 @@ def _creases_off(
 
 
 def _divided(vertices: Floats, faces: Ints, edges: Ints, points: Floats) -> tuple[Floats, Ints]:
-    """Insert a point on each of (k, 2) halfedges, and divide the faces on both sides."""
+    """Insert (k, 3) points on edges, given by (k, 2) halfedges, and divide the faces on both sides of each."""
     rows, corners = edges.ravel() // 3, edges.ravel() % 3
     new = np.repeat(len(vertices) + np.arange(len(edges)), 2)
     return np.concatenate([vertices, points]), divided_at(faces, rows, corners, new)
 
 
 BYTES_PER_BLOCK, BYTES_PER_CROSSING = 15_000, 1_200
-"""Measured memory of a contour: for each block of the grid near it, until the edges that it crosses are known; then in
-all, for each of these edges. Smooth surfaces take a third of the first, and a half of the second if they have more
-faces than `MOST_CREASED_FACES`."""
+"""Measured peak memory of a contour: per block of the grid near it, until the crossed edges are known, and afterwards
+per crossed edge. Smooth surfaces take a third of the first, and a half of the second if they have more faces than
+`MOST_CREASED_FACES`."""
 TOUCHING_CELLS = np.array(list(np.ndindex(3, 3, 3))) - 1
 """(27, 3) offsets of a cell and of those that touch it."""
 IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))
 """(512, 3) offsets of the nodes of a block."""
 CONTOUR_PLACES = 4096
-"""Number of places on a surface at which its contour is looked for, besides one for each part."""
+"""Number of points on a surface near which vertices of its contour are looked for, besides one for each part."""
 STEEPEST_HEIGHT = 2.0
-"""Largest slope of the height above a surface at which blocks near it are found from coarse to fine. Distance has slope
+"""Blocks near a surface are found from coarse to fine as if heights above it had this slope at most. Distance has slope
 1; where a varying distance is steeper, blocks are found by following the surface."""
 
 
 def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
-    """Compute the heights above a surface at the nodes of blocks, many blocks at a time and in several threads."""
+    """Compute heights above a surface at the nodes of blocks, in several threads; NaN beyond the grid."""
     tree, windings = prepared(offset.solid)
     values = np.empty((len(blocks), BLOCK, BLOCK, BLOCK), dtype=np.float32)
     level = offset.level
@@ -343,7 +354,7 @@ def sharp_surface(
 ) -> TriangleMesh:
     """Extract the closed, manifold surface at a distance from a solid, with sharp edges and corners.
 
-    Heights above it at all nodes are computed, but only near it, unless they are given.
+    `heights` are those above the surface at all nodes, (nx, ny, nz); by default they are computed near it only.
     """
     report = progress or (lambda fraction, step: None)
     values: NodeValues
@@ -365,7 +376,10 @@ def traced(
     around: CrossedCells,
     report: Progress,
 ) -> tuple[Floats, Ints]:
-    """Return the vertices and faces of a surface, given the edges of a grid that it crosses and the cells around."""
+    """Return (n, 3) vertices and (m, 3) faces of a surface, given the grid edges that it crosses and the cells around.
+
+    `values` are heights above the surface at nodes.
+    """
 
     def inside(nodes: Floats) -> Bools:
         return offset.distance(grid.origin + nodes * grid.spacing) < 0
@@ -386,7 +400,7 @@ def traced(
 
 
 def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
-    """Warn if the contour of a surface misses whole parts of it or much of its area."""
+    """Warn if the contour of a surface, with (n, 3) vertices, misses whole parts of it or much of its area."""
     parts, lost = _lost(offset, grid, vertices)
     n_parts = len(np.unique(parts))
     gone = n_parts - len(np.unique(parts[~lost]))
@@ -398,7 +412,7 @@ def announce_lost(offset: Offset, grid: Grid, vertices: Floats) -> None:
 
 
 def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
-    """Sample a surface; return the part of the solid at each sample, and whether the contour has no vertex nearby."""
+    """Sample a surface: (n,) part of the solid at each sample, and (n,) whether no vertex of the contour is near."""
     features = offset.solid.tree.features
     moved = callable(offset.reach) or offset.reach != 0
     faces = np.arange(len(features.faces)) if moved else np.flatnonzero(offset.solid.bounding[features.ids])
@@ -416,8 +430,8 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
     size = np.array(grid.shape) + 2
     filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
     around = (cells[on_surface, None] + TOUCHING_CELLS + 1).reshape(-1, 3)
-    keys, held = (np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled))
-    near = places_among(np.sort(held), keys) >= 0
+    keys, occupied = (np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled))
+    near = places_among(np.sort(occupied), keys) >= 0
     lost = np.asarray(~near.reshape(-1, len(TOUCHING_CELLS)).any(axis=1))
     return parts[on_surface], lost
 
@@ -443,7 +457,7 @@ def _crossed_near(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, C
 
 
 def crossed_between(heights: Floats, grid: Grid) -> tuple[Crossings, CrossedCells]:
-    """Find the edges between nodes above and below a surface, and the cells around them."""
+    """Find the grid edges between nodes above and below a surface, and the cells around them, from all heights."""
     side = WINDOW * BLOCK
     parts: list[Crossings] = []
     for window in np.ndindex(*(-(-(n - 1) // side) for n in heights.shape)):  # in the order of `crossed_edges`
@@ -466,7 +480,7 @@ def refuse_large_contour(crossings: Crossings, grid: Grid) -> None:
 
 
 def blocks_at(offset: Offset, grid: Grid) -> Ints:
-    """Find the (n, 3) blocks of a grid near a surface, by the largest slope that heights can have."""
+    """Find the (n, 3) blocks of a grid near a surface, by the largest slope that heights may have; raise if none is."""
     diagonal = (1.0 if offset.level is not None else STEEPEST_HEIGHT) * float(np.linalg.norm(grid.spacing))
 
     def near(centres: Floats, half: float) -> Bools:
@@ -486,7 +500,7 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
 
 
 def crossed_edges(band: BlockValues) -> Crossings:
-    """Find the edges whose ends lie on both sides of a surface, and where it crosses them, by linear interpolation."""
+    """Find the grid edges whose ends lie on both sides of a surface, and where it crosses them, by interpolation."""
     parts = []
     for window in np.unique(band.blocks.places // WINDOW, axis=0).astype(np.int64):
         first, size = window * WINDOW * BLOCK, WINDOW * BLOCK
@@ -495,7 +509,7 @@ def crossed_edges(band: BlockValues) -> Crossings:
 
 
 def joined_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """Join the crossings of several windows; refuse none at all."""
+    """Join the crossings of several windows; raise `OutsideError` if there are none at all."""
     if not any(len(part.axes) for part in parts):
         raise OutsideError(
             "the distance reaches the level nowhere between the nodes of the grid",

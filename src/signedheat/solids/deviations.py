@@ -35,18 +35,18 @@ SUMMARY_PERCENTILES = (0.0, 1.0, 5.0, 25.0, 50.0, 75.0, 95.0, 99.0, 100.0)
 HISTOGRAM_BINS = 40
 """Default number of bins of histograms."""
 OPEN_SHARE = 0.25
-"""Completed share of the surface above which a nominal part is measured as an open surface."""
+"""A nominal part counts as an open surface if a larger share of its surface is completed."""
 WORST_PLACES = 0.05
-"""Distance between the worst places, over the diagonal of the box around a scan, below which they are one."""
+"""Least distance between the points that `Deviation.worst` returns, relative to the diagonal of the scan's box."""
 STRAIGHT_ABOVE = 1 - 1e-6
-"""Cosine to the normal above which a point is straight above or below its nearest place."""
+"""A point is straight above or below the nearest point of the part if the cosine to the normal is larger than this."""
 
 
 @dataclass(frozen=True, eq=False)
 class Deviation(Frozen):
     """Signed distances of a scan's points to a nominal part, positive where there is too much material.
 
-    Statistics ignore vertices that no face uses.
+    Vertices of the scan that no face uses do not count in statistics.
 
     Attributes
     ----------
@@ -59,8 +59,8 @@ class Deviation(Frozen):
     completed : (n,) bool
         Whether the nearest points lie on the completion of the nominal part.
     beyond_rim : (n,) bool
-        Whether points lie beyond the boundary of an open part, such as a panel or a terrain. Their sign is that of the
-        continued surface.
+        Whether points lie beyond the boundary of an open part, such as a panel or a terrain. Their sign is the side of
+        its surface, continued beyond the boundary.
 
     See Also
     --------
@@ -196,17 +196,17 @@ class Deviation(Frozen):
         return counts.astype(np.int64), limits
 
     def worst(self, n: int = 10) -> Ints:
-        """Find the points with the largest deviations, each a twentieth of the scan's size from the others.
+        """Find the points with the largest deviations, at least a twentieth of the scan's size apart.
 
         Parameters
         ----------
         n : int
-            Number of points at most.
+            Largest number of points to return.
 
         Returns
         -------
         (k,) int
-            Points or vertices, from the largest absolute deviation on.
+            Indices of points or vertices of the scan, in order of decreasing absolute deviation.
 
         See Also
         --------
@@ -291,16 +291,17 @@ def deviation(
     Parameters
     ----------
     scan : shape or Solid, or (n, 3) points
-        Mesh or points.
+        The scan, a mesh or points.
     nominal : shape or Solid
-        The part as it should be; completed here unless it is a solid.
+        The part as it should be. Unless it is a solid, it is completed first.
     progress : callable, optional
         Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
     Returns
     -------
     Deviation
-        In the units of the scan; positive outside the part or in front of it, where there is too much material.
+        Distances in the units of the scan, positive outside the part or in front of it, where there is too much
+        material.
 
     Raises
     ------
@@ -346,7 +347,10 @@ def deviation(
 
 
 def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:
-    """Return whether a part is open as a whole, and its faces, turned to agree; only its sheets if it is not open."""
+    """Return whether a part is open as a whole, and its faces, oriented consistently, whose sides give the sign.
+
+    These are all given faces if it is open, and otherwise those of its sheets outside of bodies; None without any.
+    """
     if isinstance(given, PointCloud):
         return False, None
     areas, was_given = face_areas(solid.triangles), solid.origins >= 0
@@ -368,7 +372,10 @@ def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, Face
 
 
 def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:
-    """(n,) whether a point's nearest place is on the rim and the point is not straight above or below it."""
+    """(n,) whether the nearest point is on the boundary, and a point not straight above or below it.
+
+    `front` are the nearest points on the surface.
+    """
     rim_edges = np.bincount(surface.edges.ravel()) == 1
     rim_vertices = np.zeros(len(surface.vertices), dtype=bool)
     on_rim = rim_edges[surface.edges]

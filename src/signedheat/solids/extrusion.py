@@ -29,20 +29,20 @@ manifold3d: Any = lazy_module("manifold3d", "triangles of outlines")
 def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
     """Extrude a sheet, or outlines in the plane, along z to a plane, as a closed mesh with upright walls.
 
-    Terrain and reliefs get a base below them or above. Outlines lie at z = 0; holes run the other way, as those of
-    polygons do. Faces of a sheet are kept as they are.
+    Terrain and reliefs get a base below them or above. Outlines lie at z = 0, and holes run the other way round, as in
+    polygons. Faces of a sheet are kept as they are.
 
     Parameters
     ----------
     shape : open surface; or closed Polyline, several, or polygons of shapely or GeoJSON
-        What is extruded.
+        The sheet or the outlines.
     to : float
-        Height of the plane, z.
+        Height z of the plane, in the units of the shape.
 
     Returns
     -------
     TriangleMesh
-        Closed, facing outwards. Where a sheet hangs over itself, walls pass through it: `complete` makes one body.
+        Closed, facing outwards. Where a sheet overhangs, walls may pass through it; `complete` then makes one body.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def extrude(shape: Shapes | Polylines, to: float) -> TriangleMesh:
 
 
 def _filled(lines: list[Polyline]) -> tuple[Floats, Ints]:
-    """Return the triangles, at z = 0, that outlines fill."""
+    """Triangulate the region that closed lines bound: (n, 3) points at z = 0, and (m, 3) faces."""
     for number, line in enumerate(lines):
         if not line.closed:
             raise GeometryError(f"polyline {number} is open", remedy="close it", element=f"polyline {number}")
@@ -99,7 +99,7 @@ def _filled(lines: list[Polyline]) -> tuple[Floats, Ints]:
 
 
 def _sheet(shape: Any, height: float) -> tuple[Floats, Ints]:
-    """Return the faces of an open surface, turned to agree, that does not reach a height."""
+    """Return the vertices and the consistently oriented faces of an open surface; raise if it reaches z = `height`."""
     if isinstance(shape, PointCloud):
         raise GeometryError("points are no sheet", remedy="make a surface of them first", element="shape")
     mesh = shape.triangulation.joined

@@ -1,4 +1,4 @@
-"""Gauss's formula: which way the pieces of a surface face, and how much of a closed surface they are together.
+"""Gauss's formula: orient the pieces of a surface, and tell how much of a closed surface they are together.
 
 The winding number of a closed surface that faces outwards is 0 in front of it and 1 behind it, so that the mean of both
 sides, the *level*, is ½ on every face. Each piece gets an unknown weight s, and least squares ask for that level:
@@ -37,28 +37,28 @@ from ..search.winding_tree import WindingTree, mean_angle
 from ..surfaces.plane_fits import point_spacing
 
 WEIGHT_DAMPING = 0.01
-"""λ: keeps weights small where no level is asked for."""
+"""λ: weight of the last term, which keeps s small for pieces without samples of the level."""
 LEAST_AREA_SHARE = 1e-12
-"""Least area that a piece counts with, relative to the whole area; no level is asked for on pieces without area."""
+"""Lower bound of A_i in the last term, relative to the whole area, so that pieces without area get a weight, too."""
 PLANE_AGREEMENT = 1.0
 """μ: weight of neighbours that lie in one plane."""
 PLANE_NEIGHBORS = 12
-"""Number of neighbours that an element is compared with."""
+"""Number of nearest samples that each sample is compared with in the second term."""
 LEVEL_PLACES = 10_000
-"""Largest number of places at which the level is asked for, besides one for each piece."""
+"""Largest number of points at which the level is sampled, besides one on each piece."""
 LOOSE_DIPOLES = 64
 """More loose triangles than this become dipoles; fewer get exact solid angles, by which noise is recognized."""
 TREE_FACES = 256
-"""A piece of more faces than this has a tree of its own, which sums their solid angles."""
+"""The solid angles of a piece with more faces than this are summed by a tree; those of others one by one."""
 PIECE_RADII, NODE_RADII = 4.0, 2.0
-"""Pieces, and nodes of the tree, are dipoles beyond this distance, relative to their radius."""
+"""Pieces, and nodes of the tree, act as dipoles beyond this distance, relative to their radius."""
 SLENDER_TRIANGLE = 12.0
 """Triangles are halved if the square of their longest side over their area exceeds this: one
 dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
 PLACES_TOGETHER = 16
-"""Number of places for which dipoles are summed together. Eight take a fifth longer, 32 as long."""
+"""Number of neighbouring points for which dipoles are summed together. Eight take a fifth longer, 32 as long."""
 WEIGHT_TOLERANCE = 0.02
 """Relative residual up to which the weights of dipoles are solved for. With half of it noisy loose faces take a quarter
 longer, and are no better; with 0.05 a torus with much noise is a quarter worse."""
@@ -66,10 +66,10 @@ longer, and are no better; with 0.05 a torus with much noise is a quarter worse.
 
 @dataclass(frozen=True, eq=False)
 class Pieces(Frozen):
-    """Oriented triangles in pieces, each of which faces one way as a whole."""
+    """Triangles in pieces; the triangles of a piece are oriented consistently."""
 
     triangles: Floats  # (m, 3, 3) corners
-    labels: Ints  # (m,) piece of each, from 0 on
+    labels: Ints  # (m,) piece of each triangle, from 0 to k − 1
 
     @cached_property
     def face_areas(self) -> Floats:
@@ -83,7 +83,7 @@ class Pieces(Frozen):
 
 
 def system_of(pieces: Pieces) -> Matrix | Dipoles:
-    """Make the system of some pieces: dipoles for many loose triangles, exact solid angles for the rest."""
+    """Make the map W of k pieces: by dipoles for many loose triangles, or else by exact solid angles."""
     sizes, areas = np.bincount(pieces.labels), pieces.areas
     many = areas.sum() ** 2 > LOOSE_DIPOLES * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
     # with many pieces each face becomes a dipole, and a tree replaces the matrix W
@@ -91,39 +91,39 @@ def system_of(pieces: Pieces) -> Matrix | Dipoles:
 
 
 def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
-    """(n,) weighted means of values in groups."""
+    """(n,) means of (m,) values in groups, numbered by (m,) `groups`, with (m,) weights."""
     total = np.bincount(groups, weights, n)
     return np.bincount(groups, weights * values, n) / np.maximum(total, np.finfo(float).tiny)
 
 
 def together(fixed: Bools) -> Ints:
-    """(k,) number of the weight of each piece: pieces that are fixed share the first one, so that they keep their ways.
+    """(k,) index of the unknown weight of each piece: all `fixed` pieces share unknown 0, so that none flips alone.
 
-    What is left of a broken body has less than its level; with a weight of 1 others would have to make up for that.
+    Their weight is not set to 1, since a broken body has a level below ½, for which others would have to make up.
     """
     return np.where(fixed, 0, np.cumsum(~fixed) - (0 if fixed.any() else 1))
 
 
 def as_fixed(weights: Floats, names: Ints, fixed: Bools) -> Floats:
-    """(k,) weights of pieces by their numbers, all turned if those of `fixed` ones would be negative."""
-    turned = fixed.any() and weights[0] < 0
-    return np.asarray(-weights if turned else weights)[names]
+    """(k,) weights of pieces: the unknowns at (k,) indices `names`, all negated if that of `fixed` pieces is < 0."""
+    negated = fixed.any() and weights[0] < 0
+    return np.asarray(-weights if negated else weights)[names]
 
 
 @dataclass(frozen=True, eq=False)
 class Matrix:
-    """Matrix W of few pieces, by exact solid angles, at sampled places."""
+    """Matrix W of k pieces at n sample points on them, by exact solid angles."""
 
-    matrix: Floats  # (n, k) winding number of each piece at each place; of the place's own piece the mean of both sides
-    places: Floats  # (n, 3) positions
-    normals: Floats  # (n, 3) unit normals at the places
-    owners: Ints  # (n,) piece that each place is on
-    areas: Floats  # (n,) part of the area of its piece that each stands for
-    within: Floats  # (n,) winding numbers of the bodies that each place ignores
+    matrix: Floats  # (n, k) winding number of each piece at each sample; of the sample's own piece, mean of both sides
+    places: Floats  # (n, 3) sample points
+    normals: Floats  # (n, 3) unit normals at the samples
+    owners: Ints  # (n,) piece that each sample is on
+    areas: Floats  # (n,) part of the area of its piece that each sample stands for
+    within: Floats  # (n,) winding numbers of the bodies that each sample ignores
 
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
-        """Sample places on the pieces, and compute their winding numbers there."""
+        """Sample points on the pieces, and compute the winding number of each piece there."""
         faces, places = sampled(pieces, min(LEVEL_PLACES, 5_000_000 // len(pieces.areas)))  # limits the size of W
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
@@ -160,25 +160,28 @@ class Matrix:
         return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
-        """(k,) least-squares weights, whose signs orient the pieces; `fixed` ones share one. It needs no start."""
+        """(k,) least-squares weights, whose signs orient the pieces; the (k,) `fixed` ones get the same weight ≥ 0.
+
+        `start` is not used, since the system is solved directly.
+        """
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
-        names, k = together(fixed), self.matrix.shape[1]
-        sums = sparse.csr_array((np.ones(k), (np.arange(k), names)))
+        unknowns, k = together(fixed), self.matrix.shape[1]
+        sums = sparse.csr_array((np.ones(k), (np.arange(k), unknowns)))
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
         normal += agreement(self.places, self.normals, shares, self.owners).toarray()
-        held = np.bincount(self.owners, shares, k)
-        normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(held, LEAST_AREA_SHARE)
-        wanted = weighted.T @ (0.5 + self.within)
-        weights = scipy.linalg.solve(sums.T @ (sums.T @ normal).T, sums.T @ wanted, assume_a="pos")
-        return as_fixed(weights, names, fixed)
+        damping = np.bincount(self.owners, shares, k)
+        normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(damping, LEAST_AREA_SHARE)
+        right_side = weighted.T @ (0.5 + self.within)
+        weights = scipy.linalg.solve(sums.T @ (sums.T @ normal).T, sums.T @ right_side, assume_a="pos")
+        return as_fixed(weights, unknowns, fixed)
 
     def levels(self, signs: Floats) -> Floats:
-        """(n,) levels at the samples, without the bodies ignored there."""
+        """(n,) levels at the samples for (k,) signs of the pieces, without the bodies ignored there."""
         return np.asarray(self.matrix @ signs - self.within)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) levels at the samples due to the pieces of their own group only, given the (k,) groups of pieces."""
+        """(n,) levels at the samples due to the pieces of their own group only; `signs` and `groups` are (k,)."""
         result = np.empty(len(self.owners))
         for group in np.unique(groups):
             members, rows = groups == group, groups[self.owners] == group
@@ -187,7 +190,7 @@ class Matrix:
 
 
 def without_slender(pieces: Pieces) -> Pieces:
-    """Halve slender triangles, up to six times and to `MOST_DIPOLES`."""
+    """Halve slender triangles, up to six times and as long as there are at most `MOST_DIPOLES`."""
     triangles, labels = pieces.triangles, pieces.labels
     for _ in range(6):
         slender = side_lengths(triangles).max(axis=1) ** 2 > SLENDER_TRIANGLE * face_areas(triangles)
@@ -199,7 +202,10 @@ def without_slender(pieces: Pieces) -> Pieces:
 
 
 def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
-    """Sample faces, (n,), and (n, 3) places on them: one on each piece and `count` more, half by area, half evenly."""
+    """Sample points on pieces: (n,) the faces they are on, and (n, 3) positions.
+
+    There is one on each piece, and about `count` more: half of them are shared out by area, half evenly.
+    """
     areas, k = pieces.face_areas, len(pieces.areas)
     order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
     shares = pieces.areas / max(pieces.areas.sum(), np.finfo(float).tiny)
@@ -231,7 +237,11 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 def _small_pieces(
     corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
 ) -> None:
-    """Write the winding numbers of small pieces at places on faces; pieces beyond `PIECE_RADII` radii are dipoles."""
+    """Write winding numbers of pieces of at most `TREE_FACES` faces at (n, 3) places into the (n, k) matrix.
+
+    `corners` are (m, 9), piece by piece from `starts`, (k + 1,). `vectors` are (k, 3) area vectors, and `balls` (k, 4)
+    centres and radii: at places beyond `PIECE_RADII` radii a piece is a dipole. `own` is the face each place is on.
+    """
     for piece in range(len(starts) - 1):
         begin, end = starts[piece], starts[piece + 1]
         if end - begin > TREE_FACES:
@@ -252,15 +262,15 @@ def _small_pieces(
 
 
 class Walk(NamedTuple):
-    """A tree of places, and the nodes by which it is summed at each group of them: see `_nodes_for`."""
+    """A tree of dipoles, and the nodes by which their field is summed for each group of neighbouring dipoles."""
 
-    places: Floats  # (n, 3) positions
-    softening: Floats  # (n,)
-    items: Ints  # the places in each leaf
+    places: Floats  # (n, 3) positions of the dipoles
+    softening: Floats  # (n,) see `Dipoles`
+    items: Ints  # (leaves · `BOXES_PER_LEAF`,) the dipoles in each leaf; −1 where it has fewer
     balls: Floats  # (2 · leaves, 4) see `Dipoles.balls`
-    order: Ints  # (n,) the places in the order of the tree; each `together` of them are a group
-    starts: Ints  # (groups + 1,) where the nodes of each group begin
-    nodes: NDArray[np.int32]
+    order: Ints  # (n,) the dipoles in the order of the tree; each `together` of them are a group
+    starts: Ints  # (groups + 1,) where the nodes of each group begin in `nodes`
+    nodes: NDArray[np.int32]  # see `_nodes_for`
     together: int
 
 
@@ -268,16 +278,16 @@ class Walk(NamedTuple):
 class Dipoles:
     """The map W of many small faces or points, as dipoles softened at the scale of the distance to neighbours."""
 
-    places: Floats  # (n, 3) positions
+    places: Floats  # (n, 3) positions of the dipoles, at which the level is sampled, too
     normals: Floats  # (n, 3) unit normals
     areas: Floats  # (n,) area of each dipole
-    owners: Ints  # (n,) piece that each is part of
+    owners: Ints  # (n,) piece that each dipole is part of
     softening: Floats  # (n,) distance below which the field of a dipole levels off
-    within: Floats  # (n,) winding numbers of the bodies that each place ignores
+    within: Floats  # (n,) winding numbers of the bodies that are ignored at each dipole
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
-        """Make a dipole for each triangle or part of a slender one, or for as many as fit."""
+        """Make a dipole for each triangle, or for `MOST_DIPOLES` of them; slender triangles are halved first."""
         pieces = without_slender(pieces)
         faces, areas = np.arange(len(pieces.triangles)), pieces.face_areas
         if len(faces) > MOST_DIPOLES:
@@ -291,7 +301,7 @@ class Dipoles:
 
     @cached_property
     def tree(self) -> BoxTree:
-        """Tree over the places."""
+        """Tree over the positions."""
         return BoxTree.of(self.places, self.places)
 
     @cached_property
@@ -312,39 +322,42 @@ class Dipoles:
         return Dipoles(places, normals, areas, owners, softening, within)
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
-        """(k,) weights, those `fixed` alike, by conjugate gradients from weights near them, or from zero."""
+        """(k,) least-squares weights by conjugate gradients, from `start` or from zero.
+
+        Their signs orient the pieces; the (k,) `fixed` ones get the same weight ≥ 0.
+        """
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
-        smooth, names = agreement(self.places, self.normals, shares, self.owners), together(fixed)
-        n = int(names.max()) + 1
-        held = WEIGHT_DAMPING * np.bincount(self.owners, shares)
+        laplacian, unknowns = agreement(self.places, self.normals, shares, self.owners), together(fixed)
+        n = int(unknowns.max()) + 1
+        damping = WEIGHT_DAMPING * np.bincount(self.owners, shares)
 
         def system(values: Floats) -> Floats:
-            weights = values[names]
-            of_each = self._adjoint(shares * self._numbers(weights)) + smooth @ weights + held * weights
-            return sums_of(of_each, names, n)
+            weights = values[unknowns]
+            gradient = self._adjoint(shares * self._numbers(weights)) + laplacian @ weights + damping * weights
+            return sums_of(gradient, unknowns, n)
 
-        inverse = 1.0 / np.maximum(sums_of(smooth.diagonal() + held, names, n), np.finfo(float).tiny)
-        wanted = sums_of(self._adjoint((0.5 + self.within) * shares), names, n)
-        near = None if start is None else start[first_members(names, n)]
-        weights = conjugate_gradients(system, wanted, lambda rest: inverse * rest, near, WEIGHT_TOLERANCE)
-        return as_fixed(weights, names, fixed)
+        inverse = 1.0 / np.maximum(sums_of(laplacian.diagonal() + damping, unknowns, n), np.finfo(float).tiny)
+        right_side = sums_of(self._adjoint((0.5 + self.within) * shares), unknowns, n)
+        first_guess = None if start is None else start[first_members(unknowns, n)]
+        weights = conjugate_gradients(system, right_side, lambda rest: inverse * rest, first_guess, WEIGHT_TOLERANCE)
+        return as_fixed(weights, unknowns, fixed)
 
     def levels(self, signs: Floats) -> Floats:
-        """(n,) levels at the places, without the bodies ignored there."""
+        """(n,) levels at the dipoles for (k,) signs of the pieces, without the bodies ignored there."""
         return self._numbers(signs) - self.within
 
     def _numbers(self, signs: Floats) -> Floats:
-        """(n,) winding numbers at the places, due to all other dipoles."""
+        """(n,) winding number at each dipole due to all others, for (k,) weights of the pieces."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
         return self._at_places(partial(_potentials, self._walk, vectors, nodes)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) zeros, for the levels at the places due to their own group only: loose triangles have none."""
+        """(n,) zeros, for levels at the dipoles due to their own group only, since loose triangles have none."""
         return np.zeros(len(self.owners))
 
     def _adjoint(self, charges: Floats) -> Floats:
-        """Multiply charges at the places by the transpose of W: the (k,) fluxes of their field through the pieces."""
+        """Multiply (n,) charges at the dipoles by the transpose of W: (k,) fluxes of their field through the pieces."""
         away = self.places - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
@@ -354,20 +367,20 @@ class Dipoles:
 
     @cached_property
     def _walk(self) -> Walk:
-        """The walk of the tree of all places, which no product changes."""
+        """The tree, and the nodes for each group; the same for all products with W."""
         order = self.tree.items[self.tree.items >= 0]
         nodes = _nodes_for(self.places[order], self.balls, PLACES_TOGETHER)
         return Walk(self.places, self.softening, self.tree.items, self.balls, order, *nodes, PLACES_TOGETHER)
 
     def _at_places(self, kernel: Callable[[Ints], Floats]) -> Floats:
-        """(n, ...) values of a kernel of rows of the order of the tree, in which neighbours have the same nodes."""
-        (found,) = in_chunks(lambda rows: (kernel(rows),), np.arange(len(self.places)))
-        values = np.empty_like(found)
-        values[self._walk.order] = found
+        """(n, ...) values of a kernel at all dipoles; it is given ranges of indices into the order of the tree."""
+        (in_tree_order,) = in_chunks(lambda rows: (kernel(rows),), np.arange(len(self.places)))
+        values = np.empty_like(in_tree_order)
+        values[self._walk.order] = in_tree_order
         return values
 
     def _sums(self, values: Floats) -> Floats:
-        """(2 · leaves, d) sums of (n, d) values below each node."""
+        """(2 · leaves, d) sums of (n, d) values of the dipoles below each node of the tree."""
         leaves = len(self.tree.items) // BOXES_PER_LEAF
         sums = np.zeros((2 * leaves, values.shape[1]))
         filled = self.tree.items >= 0
@@ -380,7 +393,11 @@ class Dipoles:
 
 
 def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
-    """(k, k) signed Laplacian, times μ, of pieces with neighbours roughly in a plane; weak if they have many places."""
+    """(k, k) matrix of the second term of E: a signed graph Laplacian of the pieces, times μ.
+
+    Pieces are linked where neighbouring samples lie roughly in one plane; the link is weaker the more samples they
+    have. All but the result are (n,) per sample, `shares` its part of the whole area.
+    """
     n, k = len(places), min(PLANE_NEIGHBORS, len(places) - 1)
     near = PointTree(places).query(places, k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
@@ -401,17 +418,18 @@ def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> 
     return (sparse.diags_array(held) - links).tocsr()
 
 
-def spacing(places: Floats) -> Floats:
-    """(n,) spacing around each place, from its fourth neighbour."""
-    k = min(4, len(places) - 1)
-    return point_spacing(PointTree(places).query(places, [k + 1])[0][:, 0], k) if k else np.ones(len(places))
+def spacing(points: Floats) -> Floats:
+    """(n,) spacing of (n, 3) points around each of them, from the distance to its fourth neighbour."""
+    k = min(4, len(points) - 1)
+    return point_spacing(PointTree(points).query(points, [k + 1])[0][:, 0], k) if k else np.ones(len(points))
 
 
 @compiled
 def _nodes_for(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
-    """List the nodes whose dipoles, in place of their boxes', count for each `together` places, and where lists begin.
+    """Return where the list of each group of `together` successive places begins, and the lists of tree nodes.
 
-    Nodes that all of the places are beyond are one dipole. Of leaves near some of them, minus the number is listed.
+    A node that all places of the group are far from is listed by its number, and acts as one dipole. A leaf near some
+    of them is listed by minus its number, and its items count one by one.
     """
     leaves, stack, count = len(balls) // 2, np.empty(64, dtype=np.int64), 0
     starts, nodes = np.zeros(-(-len(places) // together) + 1, dtype=np.int64), np.empty(leaves, dtype=np.int32)
@@ -444,9 +462,10 @@ def _nodes_for(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDAr
 
 @compiled
 def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> Floats:
-    """Sum ``v · d / (|d|² + ε²)^(3/2)`` at places over all other dipoles v, where d points from the place to v.
+    """(k,) sums of ``v · d / (|d|² + ε²)^(3/2)`` over all other dipoles v, where d points from the place to v.
 
-    The places are rows of the walk's order, from a multiple of `together` on.
+    The places are those at `rows` of the walk's order, which begin at a multiple of `together`. `vectors` are (n, 3),
+    `sums_below` their (2 · leaves, 3) sums below nodes.
     """
     places, softening, items, balls, order, starts, nodes, together = walk
     leaves, result = len(balls) // 2, np.empty(len(rows))
@@ -483,7 +502,11 @@ def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> 
 
 @compiled
 def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floats:
-    """Sum ``c d / (|d|² + ε²)^(3/2)`` at places over all other charges c; d points from c to the place, which has ε."""
+    """(k, 3) sums of ``c d / (|d|² + ε²)^(3/2)`` over all other charges c, where d points from c to the place.
+
+    The places are those at `rows` of the walk's order, which begin at a multiple of `together`; ε is the softening at
+    the place. `charges` are (n,), `sums_below` (2 · leaves, 4) charges and dipole moments of nodes.
+    """
     places, softening, items, balls, order, starts, nodes, together = walk
     leaves, result = len(balls) // 2, np.empty((len(rows), 3))
     x, y, z, soft = np.empty(together), np.empty(together), np.empty(together), np.empty(together)

@@ -40,7 +40,7 @@ FAR_FIELD = 10
 
 
 def winding_numbers(samples: AreaSamples) -> Floats:
-    """Compute winding numbers at the nodes of a grid in space, of a shape sampled on it, smoothed over two cells."""
+    """Compute (nx, ny, nz) winding numbers, smoothed over two cells, at the nodes of the grid of some samples."""
     shape, spacing = np.array(samples.nodes.shape[1:]), samples.nodes.steps[1:]
     nodes, vectors = samples.nodes.nonzero()
     nodes = nodes[:, 1:]
@@ -48,7 +48,7 @@ def winding_numbers(samples: AreaSamples) -> Floats:
     below, above = (np.maximum(0, FAR_FIELD - room) for room in (nodes.min(axis=0), shape - 1 - nodes.max(axis=0)))
     inner = tuple(slice(first, first + n) for first, n in zip(below, shape, strict=True))
     size = tuple((shape + below + above).tolist())
-    right = _divergence(nodes + below, vectors, size, spacing)
+    right_side = _divergence(nodes + below, vectors, size, spacing)
     dipoles, strengths = blocks_of_dipoles(samples.positions + below, samples.vectors)
     walls = [_wall(axis, end, size) for axis in range(3) for end in (0, 1)]
     core = DIPOLE_CORE * float(spacing.max())
@@ -60,10 +60,10 @@ def winding_numbers(samples: AreaSamples) -> Floats:
     fields = []
     for (axis, end, lattice), (w, flux) in zip(walls, in_threads(far_field, walls), strict=True):
         flux = _refined(flux.reshape(lattice.shape[:-1]), size, axis) / spacing[axis]
-        layer = np.moveaxis(right, axis, 0)[-1 if end else 0]
+        layer = np.moveaxis(right_side, axis, 0)[-1 if end else 0]
         layer += flux if end else -flux
         fields.append(_refined(w.reshape(lattice.shape[:-1]), size, axis))
-    result = solve_poisson(right, spacing, overwrite=True)
+    result = solve_poisson(right_side, spacing, overwrite=True)
     excess = [
         result.take(-1 if end else 0, axis=axis) - field for (axis, end, _), field in zip(walls, fields, strict=True)
     ]
@@ -72,7 +72,10 @@ def winding_numbers(samples: AreaSamples) -> Floats:
 
 
 def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Floats]:
-    """Return the mean positions and the sums of the area vectors in each block of `DIPOLE_CELLS` cells."""
+    """Sum (n, 3) area vectors in blocks of `DIPOLE_CELLS` cells: (b, 3) mean positions, and (b, 3) sums.
+
+    Positions, (n, 3), are in cells.
+    """
     blocks = np.floor(positions / DIPOLE_CELLS).astype(np.int64)
     blocks -= blocks.min(axis=0)
     owners = blocks[:, 0]
@@ -88,19 +91,22 @@ def blocks_of_dipoles(positions: Floats, vectors: Floats) -> tuple[Floats, Float
 
 
 def _divergence(nodes: Ints, vectors: NDArray[np.float32], shape: tuple[int, ...], spacing: Floats) -> Floats:
-    """∇·(n δ) on a grid, by central differences of vectors at (k, 3) nodes, none of which is at the walls."""
-    right = np.zeros(shape)
+    """(nx, ny, nz) values of ∇·(n δ), by central differences of (k, 3) vectors at (k, 3) nodes off the boundary."""
+    result = np.zeros(shape)
     volume = float(np.prod(spacing))
     flows = (-0.5 / spacing * volume ** (2 / 3) / volume) * vectors[:, :3].astype(np.float64)
     for axis, flow in enumerate(flows.T):
         step = np.arange(3) == axis
-        right[tuple((nodes + step).T)] += flow
-        right[tuple((nodes - step).T)] -= flow
-    return right
+        result[tuple((nodes + step).T)] += flow
+        result[tuple((nodes - step).T)] -= flow
+    return result
 
 
 def _wall(axis: int, end: int, shape: tuple[int, ...]) -> tuple[int, int, Floats]:
-    """Return axis, end and lattice of a wall, half a cell beyond the last nodes: places about 8 apart, in cells."""
+    """Return axis, end and (a, b, 3) points of a wall of the grid's box, which is half a cell beyond the last nodes.
+
+    Points are about 8 cells apart, in units of cells. `end` is 0 for the lower wall, and 1 for the upper one.
+    """
     lines = [np.linspace(-0.5, n - 0.5, max(2, 1 + -(-n // 8))) for n in shape]
     lines[axis] = lines[axis][[-1 if end else 0]]
     lattice = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)
@@ -113,16 +119,19 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
     `shape` is that of the grid, and `axis` the one across the wall.
     """
     for d, n in enumerate(m for k, m in enumerate(shape) if k != axis):
-        place = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
-        below = np.minimum(place.astype(np.int64), values.shape[d] - 2)
-        f = (place - below).reshape(-1, *(1,) * (values.ndim - 1 - d))
+        position = (np.arange(n) + 0.5) / n * (values.shape[d] - 1)
+        below = np.minimum(position.astype(np.int64), values.shape[d] - 2)
+        f = (position - below).reshape(-1, *(1,) * (values.ndim - 1 - d))
         values = values.take(below, axis=d) * (1 - f) + values.take(below + 1, axis=d) * f
     return values
 
 
 @compiled
 def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
-    """Sum the winding numbers due to dipoles at places, and their derivatives along an axis."""
+    """(k,) winding number due to dipoles at (k, 3) places, and (k,) its derivative along an axis.
+
+    Dipoles have (d, 3) positions and (d, 3) area vectors `strengths`; within `core` of one its field is bounded.
+    """
     value, slope = np.zeros(len(places)), np.zeros(len(places))
     for i in range(len(places)):
         for j in range(len(dipoles)):
@@ -158,7 +167,10 @@ class Heat:
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:
-    """Extract the closed zero set of φ in cells about `cell` wide (0: the finest); None if the shape bounds nothing."""
+    """Extract the closed zero set of φ as (n, 3) vertices and (m, 3) faces; None if the shape bounds nothing.
+
+    Cells of the grid are about `cell` wide, or as small as `HEAT_NODES` allows if it is 0.
+    """
     bounds = shape.bounds
     side = float(np.ptp(bounds, axis=0).max())
     room = room_around(bounds)  # the surface stays within it, however large later grids are

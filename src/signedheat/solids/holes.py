@@ -30,7 +30,7 @@ Rims = Sequence[Ints]
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Filled:
-    """What `fill_holes` says of the mesh that it returns.
+    """Attributes of the meshes that `fill_holes` returns.
 
     Attributes
     ----------
@@ -39,14 +39,15 @@ class Filled:
     filled : sequence of (k,) int
         Vertices around each hole that was closed.
     left : sequence of (k,) int
-        Vertices around each rim that is still open: larger holes, and outlines of sheets.
+        Vertices around each boundary loop that is still open: larger holes, and outlines of sheets.
     """
 
     origins: Ints
     filled: Rims
     left: Rims
 
-    def _note(self, origins: Ints, filled: Rims, left: Rims) -> None:
+    def _set_origins(self, origins: Ints, filled: Rims, left: Rims) -> None:
+        """Set the three attributes of a new mesh."""
         vars(self).update(origins=origins, filled=filled, left=left)
 
 
@@ -96,18 +97,18 @@ def fill_holes(
 ) -> FilledMesh | FilledPolygonMesh:
     """Close holes of a mesh, and leave everything else as it is.
 
-    Vertices and faces stay in their order, whichever way they face, broken or not. New ones follow, and face as their
-    neighbours do. Every boundary loop of a part that bounds something is a hole. Sheets stay sheets: the longest
-    boundary loop of each is its outline. To make a solid of a broken shape, use `complete`.
+    Vertices and faces of the mesh are kept as they are, in their order. New ones follow, and are oriented as their
+    neighbours are. Every boundary loop of a part that bounds something is a hole. Sheets stay sheets: the longest
+    boundary loop of each is its outline, which stays open. To make a solid of a broken shape, use `complete`.
 
     Parameters
     ----------
     mesh : TriangleMesh or PolygonMesh
         Any mesh.
     largest : float, optional
-        Length of the longest boundary loop that is closed, in the units of the mesh.
+        Boundary loops longer than this stay open, in the units of the mesh.
     rims : int or sequence of int, optional
-        Close only boundary loops through these vertices, including outlines of sheets.
+        Close only the boundary loops through these vertices, even if they are outlines of sheets.
     lids : {"bent", "flat"}
         Whether patches continue the curvature of the surface, or are flat, as in `complete`.
 
@@ -174,12 +175,16 @@ def fill_holes(
         made = FilledPolygonMesh(points, [*given.polygons, *added])
     else:
         made = FilledMesh(points, np.concatenate([given.faces, added]))
-    made._note(np.append(np.arange(n), np.full(len(added), -1)), filled, left)
+    made._set_origins(np.append(np.arange(n), np.full(len(added), -1)), filled, left)
     return made
 
 
 def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:
-    """(l,) whether loops are holes: those along bounding faces, and all loops of a sheet but the longest."""
+    """(l,) whether loops are holes: those along bounding faces, and all loops of a sheet but the longest.
+
+    `around` are the vertices of l loops with (l,) lengths, along (m, 3) `faces`, which are triangles `used` of the
+    chain that was decided about.
+    """
     keys = (faces << 32 | np.roll(faces, -1, axis=1)).ravel()
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
@@ -199,9 +204,9 @@ def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: 
 
 
 def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
-    """(l,) whether loops pass through one of the named vertices, or through another vertex at its place."""
-    places = same_positions(vertices)
-    hits_by_loop = [np.isin(places[named], places[loop]) for loop in around]
+    """(l,) whether loops pass through a `named` vertex, or one at its position; raise if a named one is on no loop."""
+    first = same_positions(vertices)
+    hits_by_loop = [np.isin(first[named], first[loop]) for loop in around]
     missed = ~np.any(np.array(hits_by_loop, dtype=bool).reshape(-1, len(named)), axis=0)
     if missed.any():
         vertex = f"vertex {named[np.argmax(missed)]}"
@@ -212,7 +217,10 @@ def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
 
 
 def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
-    """Turn each connected part of the new faces if most of the given faces along its edges had been turned."""
+    """Flip each connected part of the (k, 3) added faces if most given faces along its edges had been flipped.
+
+    `turned` tells which of the (m, 3) given `faces` had been flipped.
+    """
     if not len(added):
         return added
     table = edge_table(np.concatenate([faces, added]))

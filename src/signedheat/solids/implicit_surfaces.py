@@ -27,68 +27,71 @@ NODES_AT_ONCE = 1 << 17
 LEAST_WEIGHT = 1e-9
 """Nodes with a smaller weight do not count for a point: on an edge of the grid only its ends do."""
 EDGE_COSINE = np.cos(np.deg2rad(15.0))
-"""An edge passes between nodes if the cosine between the slope at a node and the mean around it is below this."""
+"""A sharp edge passes between nodes if the cosine between the gradient at one and their mean direction is below
+this."""
 KNOWN_SLOPE = 0.1
-"""The slope at a node is not known well if it changes by a larger share of itself from node to node."""
+"""The gradient at a node counts as unknown if it changes by a larger share of its length from node to node."""
 CLEAR_ERRORS = 0.25
-"""Planes are joined by their maximum, or minimum, if its error at nodes is below this share of that of the other."""
+"""At a sharp edge, planes are joined by their maximum if its error at nodes is below this share of that of their
+minimum, and the other way round."""
 CELL_CORNERS = np.array(list(np.ndindex(2, 2, 2)))
-"""Corners of a cell."""
+"""(8, 3) offsets of the corners of a cell from the lowest."""
 
 
 @dataclass(frozen=True, eq=False)
 class Implicit:
-    """The level set of a function within a box, the walls of which close it."""
+    """The zero set of a function within a box, the walls of which close it."""
 
-    function: Callable[[Floats], Floats]  # of (n, 3) points in the box: values, (n,), and their gradients, (n, 3)
-    gradient: Callable[[Floats], Floats]
+    function: Callable[[Floats], Floats]  # (n,) values at (n, 3) points in the box, negative inside
+    gradient: Callable[[Floats], Floats]  # (n, 3) gradients there
     box: Floats  # (2, 3) lower and upper corner
 
     def distance(self, points: Floats) -> Floats:
-        """(n,) values, or distances from the walls where these are greater."""
+        """(n,) values of the function at (n, 3) points, or distances beyond the walls where these are greater."""
         return np.maximum(self.function(np.clip(points, *self.box)), self._beyond(points).max(axis=1))
 
     def slopes(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n,) distances from the surface, estimated by the slope of the function, and (n, 3) unit gradients."""
-        places = np.clip(points, *self.box)
-        gradients = self.gradient(places)
+        """(n,) estimated distances from the surface, values over the length of gradients; (n, 3) unit gradients."""
+        inside_box = np.clip(points, *self.box)
+        gradients = self.gradient(inside_box)
         steepness = np.maximum(np.linalg.norm(gradients, axis=1), np.finfo(float).tiny)
-        away, ways = self.function(places) / steepness, gradients / steepness[:, None]
+        away, directions = self.function(inside_box) / steepness, gradients / steepness[:, None]
         walls = self._beyond(points)
         rows, nearest = np.arange(len(points)), walls.argmax(axis=1)
         outside = walls[rows, nearest] > away
         normals = np.concatenate([-np.eye(3), np.eye(3)])[nearest]
-        return np.where(outside, walls[rows, nearest], away), np.where(outside[:, None], normals, ways)
+        return np.where(outside, walls[rows, nearest], away), np.where(outside[:, None], normals, directions)
 
     def planes(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n, 3) places on the surface near points, and its normals there."""
-        away, ways = self.slopes(points)
-        return points - away[:, None] * ways, ways
+        """(n, 3) points on the surface near given ones, estimated, and (n, 3) unit normals there."""
+        away, normals = self.slopes(points)
+        return points - away[:, None] * normals, normals
 
     def _beyond(self, points: Floats) -> Floats:
-        """(n, 6) distances of points beyond each wall."""
+        """(n, 6) distances of points beyond the three lower and the three upper walls, negative within."""
         return np.concatenate([self.box[0] - points, points - self.box[1]], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class NodePlanes:
-    """A function that mixes planes at the nodes of a grid linearly; at sharp edges it is their maximum or minimum."""
+    """A function that interpolates planes at grid nodes linearly; at sharp edges it is their maximum or minimum."""
 
-    origin: Floats
-    spacing: Floats
-    values: Floats
-    gradients: Floats
-    known: Bools  # nodes whose slopes are known well; others take the mean slope of such neighbours
+    origin: Floats  # (3,) position of the first node
+    spacing: Floats  # (3,) distance between nodes
+    values: Floats  # (nx, ny, nz) values at nodes
+    gradients: Floats  # (nx, ny, nz, 3) gradients at nodes
+    known: Bools  # (nx, ny, nz) nodes whose gradients are known well; others get the mean of such neighbours
 
     def function(self, points: Floats) -> Floats:
-        """(n,) values."""
-        return self._values_and_slopes(points)[0]
+        """(n,) values at (n, 3) points."""
+        return self._values_and_gradients(points)[0]
 
     def gradient(self, points: Floats) -> Floats:
-        """(n, 3) slopes, of the plane that is the maximum or minimum, or mixed."""
-        return self._values_and_slopes(points)[1]
+        """(n, 3) gradients at (n, 3) points."""
+        return self._values_and_gradients(points)[1]
 
-    def _values_and_slopes(self, points: Floats) -> tuple[Floats, Floats]:
+    def _values_and_gradients(self, points: Floats) -> tuple[Floats, Floats]:
+        """(n,) values and (n, 3) gradients at (n, 3) points, from the planes at the eight nodes of the cell."""
         cells = (points - self.origin) / self.spacing
         base = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.values.shape) - 2)
         shares = (cells - base)[:, None]
@@ -103,13 +106,13 @@ class NodePlanes:
         slopes = np.where((known | (total < LEAST_WEIGHT))[..., None], slopes, middle[:, None])
         heights = values + np.einsum("nkd,nkd->nk", slopes, (shares - CELL_CORNERS) * self.spacing)
         mixed, mean = (weights * heights).sum(axis=1), (weights[..., None] * slopes).sum(axis=1)
-        ways = unit(slopes)
-        together = unit(np.where(known[..., None], ways, 0.0).sum(axis=1))
-        agreement = np.where(known, np.einsum("nkd,nd->nk", ways, together), 1.0).min(axis=1)
+        directions = unit(slopes)
+        mean_direction = unit(np.where(known[..., None], directions, 0.0).sum(axis=1))
+        agreement = np.where(known, np.einsum("nkd,nd->nk", directions, mean_direction), 1.0).min(axis=1)
         rows = np.flatnonzero(agreement < EDGE_COSINE)
         values, slopes, heights, counts = values[rows], slopes[rows], heights[rows], known[rows]
-        between = (CELL_CORNERS[None, :] - CELL_CORNERS[:, None]) * self.spacing  # from each corner to the others
-        planes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, between)
+        offsets = (CELL_CORNERS[None, :] - CELL_CORNERS[:, None]) * self.spacing  # from each corner to the others
+        planes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, offsets)
         errors, places = [], []
         for sign in (1.0, -1.0):
             hidden = np.where(counts, 0.0, -np.inf)
@@ -134,7 +137,7 @@ def contour(
     gradient: Function | ArrayLike | None = None,
     resolution: int | None = None,
 ) -> TriangleMesh:
-    """Extract the closed, manifold surface on which a function, or an array, takes a level.
+    """Extract the closed, manifold surface on which a function, or an array of values, equals a level.
 
     Normals point to greater values. Sharp surfaces have the edges and corners of the function, as those of
     `Solid.surface` do, and do not intersect themselves. Where the function is less than the level at the walls of the
@@ -145,30 +148,30 @@ def contour(
     f : callable, or (nx, ny, nz) float
         A function that returns one number for each of (n, 3) points; or values at the nodes of a grid.
     bounds : (2, 3) float
-        Lower and upper corner of the box; of an array, the positions of its first and of its last node.
+        Lower and upper corner of the box. For an array, the positions of its first and last nodes.
     spacing : float or (3,) float, optional
-        Size of the cells in which a function is sampled. Arrays have their own.
+        Size of the cells in which a function is sampled. An array has its own.
     level : float
-        The level.
+        Value of the function, or of the array, on the surface.
     sharp : bool
         Use dual contouring; otherwise marching cubes, which cut edges off.
     gradient : callable, or (nx, ny, nz, 3) float, optional
-        Gradients. Of a function, at (n, 3) points; of an array, at its nodes, or a function that gives those.
-        Differences by default.
+        A function that returns the (n, 3) gradients of `f` at (n, 3) points; or, for an array, the gradients at its
+        nodes. By default they are estimated by differences.
     resolution : int, optional
         Number of cells along the longest side of the box, for a function without `spacing`; 128 by default.
 
     Returns
     -------
     TriangleMesh
-        Of functions with flat sides, edges and corners are exact to rounding where cells resolve them; those that bend
-        are off by the square of the cells. Edges of arrays are exact where gradients are given; with differences they
-        are off by up to a quarter of a cell, and corners and edges of holes by more.
+        A closed surface. For functions with flat sides, edges and corners are exact up to rounding where cells resolve
+        them; for curved ones, errors are quadratic in the size of cells. For arrays, edges are exact if gradients are
+        given. With differences they are off by up to a quarter of a cell, and corners and edges of holes by more.
 
     Raises
     ------
     OutsideError
-        If the level is nowhere between the nodes.
+        If the values at all nodes are below the level, or none of them is.
     SignedHeatError
         If a function does not return a finite number for each point.
     UnsupportedTypeError
@@ -221,7 +224,7 @@ def contour(
 
 
 def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:
-    """Make the level set of a function. By default, slopes are differences over steps that fit its precision."""
+    """Make the level set of a function; without a gradient, it is found by differences that suit its precision."""
 
     def values(points: Floats) -> Floats:
         return _called(f, points, ())[..., 0] - level
@@ -231,8 +234,8 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
     steps = float(rounding) ** 0.25 * grid.spacing
 
     def differences(points: Floats) -> Floats:
-        ways = steps * np.eye(3)
-        around = np.stack([points[:, None] + ways, points[:, None] - ways])
+        steps_along_axes = steps * np.eye(3)
+        around = np.stack([points[:, None] + steps_along_axes, points[:, None] - steps_along_axes])
         ahead, back = values(np.clip(around, *box).reshape(-1, 3)).reshape(2, len(points), 3)
         return (ahead - back) / np.einsum("nkk->nk", np.clip(around[0], *box) - np.clip(around[1], *box))
 
@@ -244,7 +247,10 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
 
 
 def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
-    """Call a function on points in batches, and check that it returns (n, 1) or (n, 3) finite numbers."""
+    """Call a function on (n, 3) points in batches; return (n, 1) values, or (n, 3) if `shape` is (3,).
+
+    Raise if it returns another shape, or numbers that are not finite.
+    """
     parts = [np.empty((0, *(shape or (1,))))]
     for begin in range(0, len(points), NODES_AT_ONCE):
         asked = points[begin : begin + NODES_AT_ONCE]
@@ -265,9 +271,10 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, level: float) -> tuple[Implicit, Grid]:
-    """Make the level set of values f, (nx, ny, nz), in a box, and the grid to contour on, with walls outside.
+    """Make the level set of values f, (nx, ny, nz), in a box, and the grid to contour it on, with walls outside.
 
-    `gradient` is (nx, ny, nz, 3) slopes at nodes, or a function; by default differences, unknown where they jump.
+    `gradient` are (nx, ny, nz, 3) gradients at nodes, or a function that returns them. By default they are estimated by
+    differences, and count as unknown where these change too fast.
     """
     values = array_of(f, "f").astype(np.float64)
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
@@ -300,7 +307,11 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
 
 
 def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
-    """Second-order differences along an axis, of the least bent of three parabolas (Harten 1987), and its bend."""
+    """Differentiate values along an axis by the parabola, of three, that bends least (Harten 1987): slopes, and bends.
+
+    Both have the shape of the values, and are differences per node. Bends are absolute second differences, halved if
+    the node is in the middle of the parabola.
+    """
     v = np.moveaxis(values, axis, 0)
     if len(v) < 3:
         return np.broadcast_to(np.moveaxis(v[1:] - v[:1], 0, axis), values.shape), np.zeros(values.shape)

@@ -76,7 +76,7 @@ class KeptSurface:
 
 
 def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurface:
-    """Join the bounding triangles of a solid into a closed mesh, and contour it where they do not join."""
+    """Join the bounding triangles of a solid into a closed mesh, with parts of a contour where they do not join."""
     windings = solid.windings
     bounding = solid.triangles[solid.bounding]
     if not len(bounding):
@@ -96,11 +96,11 @@ def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurf
     for attempt in range(MOST_CONTOURS):  # with other walls each time
         bad.append(_along(best.points[best.bad], 0.5 * cell))
         boxes = Boxes.around(np.concatenate(bad), cell, (attempt + 1) * WALL_SHIFT % 1)
-        found = _exchanged(whole, windings, surface, boxes)
-        if attempt and (found.open, len(found.bad)) >= (best.open, len(best.bad)):
+        joined = _exchanged(whole, windings, surface, boxes)
+        if attempt and (joined.open, len(joined.bad)) >= (best.open, len(best.bad)):
             break
-        best, used = found, boxes
-        if not len(found.bad):
+        best, used = joined, boxes
+        if not len(joined.bad):
             break
     if not best.open and (whole.open or len(best.bad) < len(whole.bad)):
         return KeptSurface(_without_crumbs(best.mesh, used), f"faces kept but {_unjoined(used.middles)}")
@@ -111,7 +111,7 @@ def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurf
 
 
 def _unjoined(places: Floats) -> str:
-    """Say where a contour was taken, for messages."""
+    """Return words for a message: around how many of (k, 3) places the surface is a contour, and the first of them."""
     x, y, z = places[0]
     around = "one place" if len(places) == 1 else f"{counted(len(places), 'place')}, the first"
     return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
@@ -132,7 +132,10 @@ def _far(surface: TriangleMesh, triangles: Floats, distance: float) -> Floats:
 
 
 def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: Boxes) -> Joined:
-    """Replace what is in boxes by a surface, and add walls of the boxes where only one of the two has its inside."""
+    """Replace the triangles within boxes by those of a contour, and close the steps between both by walls of the boxes.
+
+    There is a step where a wall is inside either the solid of `windings` or the contour `surface`, but not both.
+    """
     contour = surface.vertices[surface.faces]
     near = contour[boxes.grown.have(surface.vertices)[surface.faces].any(axis=1)]
     points, faces = indexed(np.concatenate([whole.points[whole.faces], near, boxes.walls]))
@@ -142,11 +145,11 @@ def _exchanged(whole: Joined, windings: Windings, surface: TriangleMesh, boxes: 
     centres = widest(pieces)
     within, kind = boxes.have(centres), sets[pieces.origins]
     walls = np.flatnonzero(kind == 2)
-    here, there = Windings(contour).inside(centres[walls]), windings.inside(centres[walls])
-    chosen = [(kind == 0) & ~within, (kind == 1) & within, walls[here & ~there]]
-    backwards = pieces.faces[walls[there & ~here]][:, ::-1]
+    in_contour, in_solid = Windings(contour).inside(centres[walls]), windings.inside(centres[walls])
+    chosen = [(kind == 0) & ~within, (kind == 1) & within, walls[in_contour & ~in_solid]]
+    backwards = pieces.faces[walls[in_solid & ~in_contour]][:, ::-1]
     return Joined.of(
-        pieces.points, without_doubles(np.concatenate([*(pieces.faces[each] for each in chosen), backwards]))
+        pieces.points, without_doubles(np.concatenate([*(pieces.faces[rows] for rows in chosen), backwards]))
     )
 
 
@@ -162,52 +165,52 @@ def _without_crumbs(mesh: TriangleMesh, boxes: Boxes) -> TriangleMesh:
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
-    """Cells of a grid."""
+    """Some cells of a grid."""
 
-    places: Ints  # (n, 3) indices of the cells along each axis
+    indices: Ints  # (n, 3) indices of the cells along each axis
     cell: float  # length of their edges
     shift: Floats  # (3,) position of the grid's origin, in cells
 
     @classmethod
     def around(cls, points: Floats, cell: float, shift: Floats) -> Boxes:
-        """Return the cells that points are in, and all that touch them."""
+        """Return the cells that (m, 3) points are in, and all that touch them."""
         return cls(np.unique(np.floor(points / cell - shift).astype(np.int64), axis=0), cell, shift).grown
 
     @cached_property
     def grown(self) -> Boxes:
         """These cells and all that touch them."""
-        near = self.places[:, None] + np.array(list(np.ndindex(3, 3, 3))) - 1
+        near = self.indices[:, None] + np.array(list(np.ndindex(3, 3, 3))) - 1
         return Boxes(np.unique(near.reshape(-1, 3), axis=0), self.cell, self.shift)
 
     def have(self, points: Floats) -> Bools:
         """(m,) which of (m, 3) points are in these cells."""
-        return _among(np.floor(points / self.cell - self.shift).astype(np.int64), self.places)
+        return _among(np.floor(points / self.cell - self.shift).astype(np.int64), self.indices)
 
     @cached_property
     def walls(self) -> Floats:
         """(k, 3, 3) triangles of the sides between these cells and others; they face the others."""
-        found = []
+        sides = []
         for axis in range(3):
             for side in range(2):
                 step = np.zeros(3, dtype=np.int64)
                 step[axis] = 2 * side - 1
-                outer = self.places[~_among(self.places + step, self.places)]
-                found.append(outer[:, None] + np.roll(CELL_SQUARES[side], axis, axis=1))
-        quads = np.concatenate(found)
+                outer = self.indices[~_among(self.indices + step, self.indices)]
+                sides.append(outer[:, None] + np.roll(CELL_SQUARES[side], axis, axis=1))
+        quads = np.concatenate(sides)
         return self.cell * (np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]) + self.shift)
 
     @property
     def middles(self) -> Floats:
         """(k, 3) middle of each connected group of cells."""
-        corners = (self.places[:, None] + np.array(list(np.ndindex(2, 2, 2)))).reshape(-1, 3)
+        corners = (self.indices[:, None] + np.array(list(np.ndindex(2, 2, 2)))).reshape(-1, 3)
         _, ids = np.unique(corners, axis=0, return_inverse=True)
         parts = element_components(ids.reshape(-1, 8))
         counts = np.bincount(parts)
-        return self.cell * (sums_of(self.places + 0.5, parts, len(counts)) / counts[:, None] + self.shift)
+        return self.cell * (sums_of(self.indices + 0.5, parts, len(counts)) / counts[:, None] + self.shift)
 
 
-def _among(places: Ints, others: Ints) -> Bools:
-    """(n,) which of (n, 3) cells are among others."""
-    both = np.concatenate([others, places])
+def _among(cells: Ints, others: Ints) -> Bools:
+    """(n,) which of (n, 3) cell indices are among the (k, 3) others."""
+    both = np.concatenate([others, cells])
     keys = np.ravel_multi_index(tuple((both - both.min(axis=0)).T), tuple(np.ptp(both, axis=0) + 1))
     return np.isin(keys[len(others) :], keys[: len(others)])

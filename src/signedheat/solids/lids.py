@@ -1,4 +1,4 @@
-"""Lids: thin plates spanned by rims, clamped where the surface bends towards its rim and hinged where it does not.
+"""Lids: thin plates that close rims, clamped where the surface bends towards its rim and hinged where it does not.
 
 Rims of surfaces that do not bend get lids of flat faces that meet in creases.
 """
@@ -19,20 +19,20 @@ from ..parallel import PointTree
 from .rims import corners_of
 
 LOOP_POINTS = 128
-"""Number of points of the loop that a lid spans. Half or twice as many change the volume by less than 1 %."""
+"""Number of points of the smoothed rim that a lid spans. Half or twice as many change the volume by less than 1 %."""
 RIM_SMOOTHING = 1 / 48
-"""Zigzags of a rim are averaged over this share of its length."""
+"""Rims are smoothed by averages over this share of their length."""
 FILM_ROUNDS = 3
-"""Number of times that a film is solved for again, with the cotangents of the solution before."""
+"""Number of times that the surface of least area is solved for again, with the cotangents of the previous solution."""
 PLATE_AT_REST, PLATE_MOVES = 1e-3, 64
-"""A plate is at rest once it is expected to move by at most this share of the diagonal of its rim; it makes at most
-this number of moves. Nearly all plates rest after 5 to 40 moves."""
+"""The iteration of a plate ends once further moves are expected to sum to at most this share of the diagonal of its
+rim, or after this number of moves. Nearly all plates need 5 to 40 moves."""
 RIM_CLEARANCE = 0.5
-"""Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of its points."""
+"""Points of the smooth lid nearer to the rim than this are left out, relative to the mean distance of rim points."""
 LAYER_GROWTH = 0.35
 """Growth of triangles with their distance from the rim, relative to that distance."""
 MOST_TIES = 128
-"""Maximum number of equally distant points of a loop that are compared, and number of places compared for each."""
+"""Largest number of equally distant points of a loop that are compared, and number of positions compared for each."""
 Frame = tuple[Floats, Floats]
 """Origin and (3, 2) axes of a plane."""
 
@@ -45,11 +45,14 @@ class Lid:
     faces: Ints  # (m, 3) counterclockwise from outside
     n_rim: int  # how many points the rim has
     plane: Floats  # (n, 2) its vertices in the plane or disc in which it was triangulated
-    places: Floats  # (n_rim,) share of the loop's length at which each point of its rim lies
+    shares: Floats  # (n_rim,) share of the loop's length at which each point of its rim lies
 
 
 def frame_of(rim: Floats) -> Frame | None:
-    """Return the plane of a loop's area through its centre, with axes for which it is counterclockwise; or None."""
+    """Return the plane through the centre of a loop, (n, 3), normal to its area vector; None if its area is near 0.
+
+    In the axes of the plane, the loop runs counterclockwise.
+    """
     normal = area_vector(rim)
     length = np.linalg.norm(normal)
     if not length > 1e-6 * np.linalg.norm(np.ptp(rim, axis=0)) ** 2:
@@ -66,7 +69,10 @@ def frame_of(rim: Floats) -> Frame | None:
 
 
 def farthest(loop: Floats, away: Floats) -> int:
-    """Find the point of a closed loop that is farthest away; of equal ones, that after which the loop stays farther."""
+    """Return the index of the point of a closed loop, (n, 3), with the largest distance `away`, (n,).
+
+    Of equal ones, it is that after which distances stay larger, so that it does not depend on the first point.
+    """
     ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:MOST_TIES]
     if len(ties) == 1:
         return int(ties[0])
@@ -77,14 +83,14 @@ def farthest(loop: Floats, away: Floats) -> int:
 
 
 def shares_of(loop: Floats) -> tuple[Floats, float]:
-    """(n + 1,) share of the length of a closed loop at which each corner comes, and 1; and that length."""
+    """(n + 1,) shares of the length of a closed loop at which its n corners lie, and 1; and the length."""
     lengths = side_lengths(loop)
     along = np.concatenate([[0.0], np.cumsum(lengths)])
     return along / along[-1], float(along[-1])
 
 
 def area_vector(loop: Floats) -> Floats:
-    """(3,) the area that a closed loop encloses, along its normal."""
+    """(3,) area vector of a closed loop of (n, 3) points: along its normal, as long as the area that it encloses."""
     around = loop - loop.mean(axis=0)
     return 0.5 * np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
 
@@ -98,18 +104,18 @@ class SmoothRim:
     points: Floats  # (k, 3) means over parts of the loop of `RIM_SMOOTHING` of its length
     # (k + 1,) shares of the length at which the middles of these parts lie: once around the loop, from the corner
     # farthest from its centre
-    places: Floats
+    shares: Floats
 
     @classmethod
     def of(cls, corners: Floats) -> SmoothRim:
-        """Smooth a loop."""
+        """Smooth a closed loop of (n, 3) corners."""
         sides = np.roll(corners, -1, axis=0) - corners
         starts, length = shares_of(corners)
         steps = np.diff(starts)[:, None]
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
         def integral(shares: Floats) -> Floats:
-            """Integrate positions along the loop, from its first corner to each share of its length."""
+            """(k, 3) integrals of the position along the loop, from its first corner to (k,) shares of its length."""
             turns, rest = np.divmod(shares, 1.0)
             k = np.minimum(np.searchsorted(starts, rest, side="right") - 1, len(starts) - 2)
             onward = (rest - starts[k])[:, None]
@@ -118,17 +124,20 @@ class SmoothRim:
 
         away = np.linalg.norm(corners - sums[-1], axis=1)
         first = starts[farthest(corners, away)]
-        places = first + np.arange(LOOP_POINTS + 1) / LOOP_POINTS
-        ends = integral(places[:-1] + 0.5 * RIM_SMOOTHING), integral(places[:-1] - 0.5 * RIM_SMOOTHING)
-        return cls(length, starts, (ends[0] - ends[1]) / RIM_SMOOTHING, places)
+        shares = first + np.arange(LOOP_POINTS + 1) / LOOP_POINTS
+        ends = integral(shares[:-1] + 0.5 * RIM_SMOOTHING), integral(shares[:-1] - 0.5 * RIM_SMOOTHING)
+        return cls(length, starts, (ends[0] - ends[1]) / RIM_SMOOTHING, shares)
 
-    def edges_at(self, places: Floats) -> Ints:
-        """(m,) edge of the loop on which each place lies, by the number of its first corner."""
-        return np.minimum(np.searchsorted(self.starts, places % 1.0, side="right") - 1, len(self.starts) - 2)
+    def edges_at(self, shares: Floats) -> Ints:
+        """(m,) edges of the loop, numbered by their first corners, on which points at (m,) shares of its length lie."""
+        return np.minimum(np.searchsorted(self.starts, shares % 1.0, side="right") - 1, len(self.starts) - 2)
 
 
 def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
-    """Edge and share of each point on a loop: its vertices, and more, at most 1 / `LOOP_POINTS` of its length apart."""
+    """Divide a closed loop into parts of at most 1 / `LOOP_POINTS` of its length, between its corners.
+
+    Return the (k,) edge of each point of division, corners included, and its (k,) share of the edge.
+    """
     lengths = side_lengths(loop)
     counts = np.maximum(np.ceil(lengths * LOOP_POINTS / lengths.sum() - 1e-9), 1).astype(np.int64)
     edges, number = numbered(counts)
@@ -136,9 +145,12 @@ def cut_to_pieces(loop: Floats) -> tuple[Ints, Floats]:
 
 
 def pattern(rim: SmoothRim, frame: Frame | None) -> Lid | None:
-    """Triangulate a film in a plane, or in a disc if there is no frame; None if its loop crosses itself there."""
+    """Triangulate a smooth rim in a plane, or in a disc without a frame; None if it crosses itself in the plane.
+
+    Inner vertices of the lid lie in the plane, or at the origin.
+    """
     if frame is None:
-        flat = _around_disc(rim.places[:-1])
+        flat = _around_disc(rim.shares[:-1])
         inner = points_in_disc(len(flat))
     else:
         flat = (rim.points - frame[0]) @ frame[1]
@@ -148,17 +160,17 @@ def pattern(rim: SmoothRim, frame: Frame | None) -> Lid | None:
         return None
     faces, inner = _without_unused(faces, n, inner)
     first = np.zeros((len(inner), 3)) if frame is None else frame[0] + inner @ frame[1].T
-    return Lid(np.concatenate([rim.points, first]), faces, n, np.concatenate([flat, inner]), rim.places[:-1])
+    return Lid(np.concatenate([rim.points, first]), faces, n, np.concatenate([flat, inner]), rim.shares[:-1])
 
 
 def _without_unused(faces: Ints, n: int, inner: Floats) -> tuple[Ints, Floats]:
-    """Return faces and those of the points after the first n that they use."""
+    """Renumber (m, 3) faces of n rim points and the (k, 2) `inner` points, and drop inner points that none uses."""
     used = np.unique(faces[faces >= n])
     return np.where(faces < n, faces, n + np.searchsorted(used, faces)), inner[used - n]
 
 
 def points_inside(polygon: Floats) -> Floats:
-    """Points within a polygon of few sides, as dense as its corners at its rim, and sparser away from it."""
+    """(k, 2) points within a polygon of few sides, as dense as its corners near them, and sparser farther inside."""
     steps = side_lengths(polygon)
     size = float(np.quantile(steps, 0.9))
     low, high = polygon.min(axis=0), polygon.max(axis=0)
@@ -180,7 +192,7 @@ def points_inside(polygon: Floats) -> Floats:
 
 
 def _inside(points: Floats, polygon: Floats) -> Bools:
-    """(k,) whether points lie inside a polygon: by the parity of crossings."""
+    """(k,) whether (k, 2) points lie inside a polygon, by the parity of crossings."""
     x, y = points.T
     (ax, ay), (bx, by) = polygon.T[..., None], np.roll(polygon, -1, axis=0).T[..., None]
     rise = np.where(by == ay, 1.0, by - ay)  # level sides are not crossed
@@ -189,7 +201,7 @@ def _inside(points: Floats, polygon: Floats) -> Bools:
 
 
 def points_in_disc(n: int) -> Floats:
-    """Points within the unit circle, as dense as n points around it at its rim, and sparser away from it."""
+    """(k, 2) points within the unit circle, near it as dense as n points around it, and sparser farther inside."""
     rings, radius, step, turn = [np.zeros((1, 2))], 1.0, 2 * np.pi / n, 0.0
     while (radius := radius - step * 0.87) >= step:
         count = max(int(np.ceil(2 * np.pi * radius / step)), 5)
@@ -201,16 +213,20 @@ def points_in_disc(n: int) -> Floats:
 
 
 EVEN_SHARE = 1e-3
-"""Weight of even spacing in the positions of points around a disc; the rest is by length along the loop."""
+"""Points around a disc are spaced by length along the loop, and to this share evenly, so that none coincide."""
 
 
 def _around_disc(shares: Floats) -> Floats:
-    """(n, 2) points on the unit circle at shares of its circumference."""
+    """(n, 2) points on the unit circle at (n,) shares of its circumference."""
     return np.stack([np.cos(2 * np.pi * shares), np.sin(2 * np.pi * shares)], axis=1)
 
 
 def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Lid) -> tuple[Floats, Ints] | None:
-    """Span a loop with inner points of another lid: added points, and triangles; None if its image crosses itself."""
+    """Span a loop by inner points of a lid of its smoothed version: (k, 3) added points, and (m, 3) triangles.
+
+    `starts` are the shares of its length at which corners lie, see `shares_of`. It is triangulated in the plane of
+    `frame`, or in a disc without one; None if it crosses itself there.
+    """
     n, inner = len(loop), over.plane[over.n_rim :]
     kept = np.ones(len(inner), dtype=bool)
     if frame is None:
@@ -219,8 +235,8 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Lid) -> tupl
         flat, inner = _around_disc(shares), _in_polygon(shares, inner)
     else:
         edges, shares = cut_to_pieces(loop)
-        ways = np.roll(loop, -1, axis=0) - loop
-        rim = (loop[edges] + shares[:, None] * ways[edges] - frame[0]) @ frame[1]
+        sides = np.roll(loop, -1, axis=0) - loop
+        rim = (loop[edges] + shares[:, None] * sides[edges] - frame[0]) @ frame[1]
         kept = PointTree(rim).query(inner)[0] > RIM_CLEARANCE * float(side_lengths(loop).sum()) / LOOP_POINTS
         flat = (loop - frame[0]) @ frame[1]
     faces = triangulate_polygon(np.concatenate([flat, inner[kept]]), n)
@@ -231,9 +247,9 @@ def draped(loop: Floats, starts: Floats, frame: Frame | None, over: Lid) -> tupl
 
 
 def _in_polygon(shares: Floats, points: Floats) -> Floats:
-    """Move (n, 2) points in the unit disc towards its centre, into the polygon with corners at shares of its rim.
+    """Move (n, 2) points of the unit disc into the polygon with corners at `shares` of its circumference.
 
-    No side of a closed loop is longer than all others, so that the centre lies within.
+    They move towards the centre, which lies within, since no side of a closed loop is longer than all others together.
     """
     place = np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi) % 1.0
     corners = np.append(shares, shares[0] + 1.0)
@@ -244,7 +260,7 @@ def _in_polygon(shares: Floats, points: Floats) -> Floats:
 
 
 def film(pattern: Lid) -> Lid:
-    """Make the lid of nearly least area (Pinkall & Polthier 1993), within the convex hull of its rim."""
+    """Return a lid with vertices moved so that its area is nearly least (Pinkall & Polthier 1993); the rim stays."""
     n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
     if n == len(vertices):
         return pattern
@@ -261,14 +277,14 @@ def film(pattern: Lid) -> Lid:
 
 
 def _laplacian(tails: Ints, heads: Ints, weights: Floats, n: int) -> sparse.csr_array:
-    """(n, n) Laplacian of a graph with weighted edges; weights of repeated edges add up."""
+    """(n, n) Laplacian of a graph with weighted edges, which are added if repeated."""
     entries = np.concatenate([-weights, -weights, weights, weights])
-    places = np.concatenate([tails, heads, tails, heads]), np.concatenate([heads, tails, tails, heads])
-    return sparse.coo_array((entries, places), shape=(n, n)).tocsr()
+    rows_and_columns = np.concatenate([tails, heads, tails, heads]), np.concatenate([heads, tails, tails, heads])
+    return sparse.coo_array((entries, rows_and_columns), shape=(n, n)).tocsr()
 
 
 def _extended(matrix: sparse.csr_array, values: Floats) -> Floats:
-    """Extend values at the rim, the first vertices of a lid, harmonically over the lid with this Laplacian."""
+    """Extend values at the rim, the first vertices of a lid, harmonically to all n, with this (n, n) Laplacian."""
     n = len(values)
     return np.concatenate([values, sparse.linalg.splu(matrix[n:, n:].tocsc()).solve(-(matrix[n:, :n] @ values))])
 
@@ -322,7 +338,7 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
 
 
 def _load(rim: Floats, normals: Floats) -> Floats:
-    """(n, 3) sum over both edges at each rim point of half their length along −g, see `plate`."""
+    """(n, 3) load of `plate` at each rim point: the sum over both edges of half their length times −g."""
     sides = np.roll(rim, -1, axis=0) - rim
     lengths = np.linalg.norm(sides, axis=1)
     load = np.zeros((len(rim), 3))
@@ -332,13 +348,13 @@ def _load(rim: Floats, normals: Floats) -> Floats:
 
 
 def _sides(faces: Ints, n: int) -> Ints:
-    """(m, 3) key of the edge opposite each corner of triangles on n vertices; both directions have the same key."""
+    """(m, 3) keys, low · n + high, of the edges opposite the corners of triangles on n vertices."""
     tails, heads = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)
     return np.minimum(tails, heads) * n + np.maximum(tails, heads)
 
 
 def _cotangents(vertices: Floats, faces: Ints) -> Floats:
-    """(m, 3) half the cotangents of the corners of triangles, bounded where they are flat."""
+    """(m, 3) half the cotangents of the angles of triangles, bounded in triangles that are nearly flat."""
     corners = vertices[faces]
     u, v = np.roll(corners, -1, axis=1) - corners, np.roll(corners, -2, axis=1) - corners
     cosine, sine = (u * v).sum(axis=2), np.linalg.norm(np.cross(u, v), axis=2)
@@ -358,25 +374,25 @@ def vertex_normals(lid: Lid) -> Floats:
 
 
 def running_mean(values: Floats, reach: int) -> Floats:
-    """(n,) means of values along a closed loop, each over the values up to `reach` places away."""
+    """(n,) means of (n,) values along a closed loop, each over 2 · `reach` + 1 successive values."""
     window = np.ones(2 * reach + 1) / (2 * reach + 1)
     return np.convolve(np.concatenate([values[len(values) - reach :], values, values[:reach]]), window, mode="valid")
 
 
 COPLANAR = 1e-3
-"""Height over a plane, relative to the length of what rises over it, up to which something lies in it: points, relative
-to their size, a unit vector along a side, and one of three unit normals, whose planes then meet in no point."""
+"""Points count as coplanar if their heights over a plane are at most this, relative to their extent. Unit vectors count
+as coplanar if the component of one across the others is at most this."""
 FLAT_LID_CORNERS = 256
-"""Number of corners above which a flat lid gets inner points, to avoid slivers."""
+"""Flat faces with more corners than this get inner points, to avoid slivers."""
 MOST_PLANAR_RUNS = 16
-"""Number of planar runs above which a rim has no creased lid."""
+"""Rims with more planar runs than this get no creased lid."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Side:
     """A straight part of a rim, or a crease."""
 
-    points: Ints  # (k,) its points, without its end
+    points: Ints  # (k,) its points, without the last, which begins the next side
     normal: Floats  # (3,) sum over its edges of length times unit normal of the surface
 
 
@@ -386,19 +402,19 @@ class _Run:
 
     first: int  # index of the first side
     count: int
-    points: Ints  # (k,) their points, with the end
+    points: Ints  # (k,) their points, including the last
     opening: Floats  # (3,) area vector of a lid in the plane
 
 
 def is_flat(points: Floats) -> bool:
-    """Whether points lie in a plane."""
+    """Whether (n, 3) points lie in a plane, up to `COPLANAR`."""
     around = points - points.mean(axis=0)
     normal = np.linalg.eigh(around.T @ around)[1][:, 0]
     return bool(np.abs(around @ normal).max() <= COPLANAR * np.linalg.norm(np.ptp(points, axis=0)))
 
 
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
-    """Make the lid of flat faces that closes a rim, as added points and triangles; None if there is none.
+    """Make a lid of flat faces that close a loop: (k, 3) added points, and (m, 3) triangles; None if there is none.
 
     A run of sides in one plane is closed by a flat face that ends at a crease. Three runs that make up the whole loop
     are closed by faces to the point where their planes meet. No face folds back over the surface, whose (n, 3)
@@ -419,20 +435,23 @@ def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
         if run is None:
             return None
         polygons.append(run.points)
-        kept = [sides[(run.first + run.count + k) % len(sides)] for k in range(len(sides) - run.count)]
-        sides = [_Side(run.points[:1], np.zeros(3)), *kept]
+        remaining = [sides[(run.first + run.count + k) % len(sides)] for k in range(len(sides) - run.count)]
+        sides = [_Side(run.points[:1], np.zeros(3)), *remaining]
     return None
 
 
 def _straight_sides(loop: Floats, normals: Floats) -> list[_Side]:
-    """Split a loop at its corners into straight sides; none if it has no corners."""
+    """Split a loop of (n, 3) points at its corners into straight sides; none if it has no corners.
+
+    `normals` are the (n, 3) unit normals of the surface at its edges.
+    """
     corners = corners_of(loop)
     weighted = side_lengths(loop)[:, None] * normals
     if not len(corners):
         return []
     order, cuts = np.roll(np.arange(len(loop)), -corners[0]), corners - corners[0]
     sums = np.add.reduceat(weighted[order], cuts, axis=0)
-    return [_Side(places, total) for places, total in zip(np.split(order, cuts[1:]), sums, strict=True)]
+    return [_Side(points, total) for points, total in zip(np.split(order, cuts[1:]), sums, strict=True)]
 
 
 def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
@@ -451,18 +470,18 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
         # neighbouring runs share a side; at least one side is left
         first, count = (int(corner) - 1) % n, min(int(after - corner) + 1, n - 1)
         chosen = [sides[(first + k) % n] for k in range(count)]
-        places = np.concatenate([*(side.points for side in chosen), sides[(first + count) % n].points[:1]])
-        opening = area_vector(points[places])
+        indices = np.concatenate([*(side.points for side in chosen), sides[(first + count) % n].points[:1]])
+        opening = area_vector(points[indices])
         surface = np.sum([side.normal for side in chosen], axis=0)
         folded = opening @ surface <= -SAME_WAY * np.linalg.norm(opening) * np.linalg.norm(surface)
         # sides that are coplanar with their neighbours may still turn out of one plane, bit by bit
-        if is_flat(points[places]) and not (folded and surface.any()):
-            runs.append(_Run(first, count, places, opening))
+        if is_flat(points[indices]) and not (folded and surface.any()):
+            runs.append(_Run(first, count, indices, opening))
     return sorted(runs, key=lambda run: -float(np.linalg.norm(run.opening)))
 
 
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
-    """Find three runs that make up a loop, whose planes meet near it: return this point, and the runs; or None."""
+    """Find three runs that make up a loop and whose planes meet near it; return that point, and the runs, or None."""
     following = {run.first: run for run in runs}
     for first in runs:
         second = following.get((first.first + first.count) % n_sides)
@@ -482,7 +501,7 @@ def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple
 
 
 def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) -> _Run | None:
-    """Find the first run whose ends lie in a plane with the sides before and after it."""
+    """Find the first run whose ends lie in one plane with the sides before and after it; None if there is none."""
     n = len(sides)
     for run in runs:
         if n - run.count < 2:
@@ -496,7 +515,10 @@ def _closed_by_a_crease(points: Floats, sides: list[_Side], runs: list[_Run]) ->
 
 
 def _filled(points: Floats, n_rim: int, polygons: list[Ints]) -> tuple[Floats, Ints] | None:
-    """Triangulate planar polygons: points added after those of the rim, and triangles; None if one crosses itself."""
+    """Triangulate planar polygons, given by indices of (n, 3) points: points from `n_rim` on, and triangles.
+
+    None if a polygon crosses itself.
+    """
     vertices, faces, count = [points], [], len(points)
     for polygon in polygons:
         corners = points[polygon]

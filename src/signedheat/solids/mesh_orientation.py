@@ -1,4 +1,4 @@
-"""Orient meshes, so that faces agree with their neighbours and face outwards; and curves, so that pieces agree."""
+"""Orient meshes and curves: faces consistently and outwards, and curves so that they bound a region together."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Mesh = TriangleMesh | PolygonMesh
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Orientation(Frozen, ShortRepr):
-    """How a mesh was oriented, and what was found on the way.
+    """An oriented mesh, and how it differs from the given one.
 
     Attributes
     ----------
@@ -40,32 +40,32 @@ class Orientation(Frozen, ShortRepr):
     turned : (k,) bool
         Which of them were flipped.
     parts : (k,) int
-        Patch of each face, connected across edges of two faces or closed as given; −1 for faces on fewer
-        than three distinct points, and inner walls.
+        Patch of each face: connected across edges of two faces, or closed as given. −1 for faces on fewer than three
+        distinct points, and for inner walls.
     undecided : (k,) bool
-        Faces of sheets, which bound nothing: they agree with their neighbours.
+        Faces of sheets, which bound nothing. They are consistent with their neighbours.
     inner : (k,) bool
-        Walls between closed cells (see `inner_walls`), which bound nothing: left as they are.
+        Walls between closed cells (see `inner_walls`), which bound nothing. They are left as they are.
     n_parts, closed_parts : int
-        Patches, and those that close.
+        Number of patches, and of closed ones among them.
     turned_parts, turned_faces, turned_area : int, int, float
-        Patches given facing inwards; faces flipped, and their share of the area.
+        Number of patches that were given facing inwards, number of flipped faces, and their share of the area.
     inconsistent_edges : int
-        Edges across which two faces disagreed.
+        Number of edges whose two faces were oriented inconsistently.
     nonmanifold_edges : int
-        Edges of three or more faces, across which orientation is not carried on.
+        Number of edges of three or more faces, across which patches are not connected.
     nonorientable_parts : int
-        Patches whose faces cannot agree, such as Möbius bands: left as they are.
+        Number of patches that cannot be oriented consistently, such as Möbius bands. They are left as they are.
     undecided_parts, undecided_area : int, float
-        Patches that bound nothing, and their share of the area.
+        Number of patches that bound nothing, and their share of the area.
     merged_faces : int
-        Duplicates left out.
+        Number of duplicate faces, which were left out.
     nested_bodies, cavities : int
-        Patches within others: those that are bodies as well, and those that are walls of cavities.
+        Number of closed patches within others that are bodies, and of those that bound cavities.
 
     See Also
     --------
-    orientation : The same, and what was flipped.
+    orientation : Orient a mesh, and report what was flipped.
     orient : Flip faces or curves so that they agree.
 
     Examples
@@ -98,13 +98,13 @@ class Orientation(Frozen, ShortRepr):
 
     @property
     def summary(self) -> dict[str, int | float]:
-        """The counts and shares by name."""
+        """All counts and shares of the area, by name."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, (int, float))}
 
     @property
     def note(self) -> ShapeOriented:
-        """The note about it in diagnostics."""
+        """A note for diagnostics with these counts and shares."""
         return ShapeOriented(**{entry.name: getattr(self, entry.name) for entry in fields(ShapeOriented)})
 
 
@@ -121,17 +121,18 @@ def orientation(
     *,
     nested: Nesting = "given",
 ) -> Orientation | CurveOrientation:
-    """Orient a mesh, or curves on a surface, and say which faces or curves were flipped, merged and left out.
+    """Orient a mesh, or curves on a surface, and report which faces or curves were flipped, merged and left out.
 
     Vertices that coincide up to rounding count as one, and so do faces on the same corners. A closed part whose faces
-    agree is kept, or flipped as a whole to face outwards. Other faces are made to agree with their neighbours across
-    edges of two faces. Walls between closed cells are left out (`inner_walls`). How often all faces go around a point,
-    their winding number, decides which way each connected patch faces, and which patches are sheets that enclose
-    nothing.
+    are consistent is kept, or flipped as a whole to face outwards. Other faces are made consistent with their
+    neighbours across edges of two faces. Walls between closed cells are not flipped (`inner_walls`). How often all
+    faces go around a point, their winding number, decides which way each connected patch faces, and which patches are
+    sheets that enclose nothing.
 
-    Curves are flipped so that they bound a region together, the one with the shortest boundary where they leave gaps.
+    Curves are flipped so that they bound a region together. Where they leave gaps, it is the region with the shortest
+    boundary.
 
-    Takes O(n log n) time for meshes.
+    Meshes take O(n log n) time.
 
     Parameters
     ----------
@@ -140,13 +141,14 @@ def orientation(
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
         The surface that the curves lie on.
     nested : {"given", "cavities", "bodies"}
-        Of meshes: what closed parts within others are. With "given", what they were given as, relative to the part
-        they lie in. With "cavities", cavities, and bodies within these. With "bodies", all bodies.
+        For meshes: whether closed parts within others are bodies or cavities. With "given", that depends on how they
+        face relative to the part around. With "cavities", they are cavities, and parts within these are bodies. With
+        "bodies", all are bodies.
 
     Returns
     -------
     Orientation or CurveOrientation
-        The oriented mesh or curves, and what was done.
+        The oriented mesh or curves, and which of them were flipped.
 
     Raises
     ------
@@ -185,18 +187,18 @@ def orientation(
 
 
 def oriented_as(shape: Mesh, owners: Ints, chain: Chain, decided: Bounding) -> Orientation:
-    """Apply a decision about the chain of a mesh to the mesh, given the face that each triangle is part of."""
+    """Orient a mesh as decided for its chain; `owners` are the (m,) faces that its triangles are part of."""
     n = int(owners.max()) + 1
     proper = chain.numbers >= 0
 
     def given(values: NDArray[Any], without: float) -> NDArray[Any]:
-        """(m,) values of the chain at the given triangles; `without` at those that it lacks."""
+        """(m,) values of the chain's distinct triangles at the given ones; `without` at those that it lacks."""
         return np.append(values, np.array(without, dtype=values.dtype))[chain.numbers]
 
     areas, as_given, inside = given(chain.areas, 0), given(decided.as_given, 0), given(decided.inner, 0)
 
     def most(mask: Bools) -> Bools:
-        """(n,) faces of which most of the area is in a mask of triangles."""
+        """(n,) whether more than half of the area of each face is in an (m,) mask of triangles."""
         return np.bincount(owners, np.where(mask, areas, -areas), n) > 0
 
     first = first_members(owners, n)
@@ -218,7 +220,7 @@ def oriented_as(shape: Mesh, owners: Ints, chain: Chain, decided: Bounding) -> O
     closing[decided.pieces] = decided.closed
     idle = np.bincount(labels, sheet[own], len(names)) > 0
     return Orientation(
-        shape=_turned_mesh(shape, kept, turned),
+        shape=_flipped_mesh(shape, kept, turned),
         faces=kept,
         turned=turned,
         parts=pieces,
@@ -245,8 +247,8 @@ def owners_of(shape: Mesh) -> Ints:
     return shape.refinement.face_polygons if isinstance(shape, PolygonMesh) else np.arange(shape.n_faces)
 
 
-def _turned_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
-    """Return a mesh of the kept faces, some of them flipped; the mesh itself if nothing changes."""
+def _flipped_mesh(shape: Mesh, kept: Ints, flipped: Bools) -> Mesh:
+    """Return a mesh of the (k,) kept faces, those that are `flipped`, (k,), reversed; `shape` if nothing changes."""
     if not flipped.any() and len(kept) == (shape.n_faces if isinstance(shape, TriangleMesh) else shape.n_polygons):
         return shape
     if isinstance(shape, TriangleMesh):
@@ -268,9 +270,9 @@ def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape)
 def orient(
     shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:
-    """Flip faces of a mesh so that neighbours agree and every part faces outwards, or curves so that they agree.
+    """Flip faces of a mesh so that all are consistent and face outwards, or curves so that they bound a region.
 
-    `orientation` also says what was flipped.
+    `orientation` also reports what was flipped.
 
     Parameters
     ----------
@@ -293,7 +295,7 @@ def orient(
 
     See Also
     --------
-    orientation : The same, and what was flipped.
+    orientation : Orient a mesh or curves, and report what was flipped.
     complete : Make a solid of a broken shape.
     fill_holes : Close holes, and leave the rest of a mesh as it is.
 
@@ -319,9 +321,9 @@ def orient(
 
 
 def agreeing_faces(mesh: TriangleMesh) -> Ints:
-    """(m, 3) faces, on the first vertex at each place, turned to agree in components where all faces can."""
+    """(m, 3) faces of a mesh, oriented consistently in components that can be, on the first vertex at each position."""
     chain, faces = Chain.of(mesh), mesh.faces.copy()
-    turned = chain.agreeing(np.ones(len(chain.faces), dtype=bool)).turned
+    flipped = chain.agreeing(np.ones(len(chain.faces), dtype=bool)).turned
     proper = chain.numbers >= 0
-    faces[proper] = np.where(turned[:, None], chain.faces[:, ::-1], chain.faces)[chain.numbers[proper]]
+    faces[proper] = np.where(flipped[:, None], chain.faces[:, ::-1], chain.faces)[chain.numbers[proper]]
     return faces

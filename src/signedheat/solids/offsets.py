@@ -26,9 +26,9 @@ from .mesh_orientation import agreeing_faces
 from .tiles import Evaluated
 
 Reach: TypeAlias = Callable[[Floats], Floats]
-"""A function that returns the signed distance of the offset surface from each of (n, 3) places of the solid."""
+"""A function that returns the (n,) signed distances of the offset surface from (n, 3) points of the solid."""
 MEETING_DISTANCE = 1e-7
-"""Triangles meet at a place if they are at most this far from it, relative to the size of the solid."""
+"""Triangles meet at a point if they are at most this far from it, relative to the size of the solid."""
 DIFFERENCE_STEP = 1e-6
 """Step of the differences that give the gradient of a varying distance, relative to the size of the solid."""
 ALONG_AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -39,14 +39,14 @@ class Offset:
     """The surface at a distance from a solid, as the zero set of a function that grows outwards."""
 
     solid: Evaluated  # from which distance is measured
-    reach: float | Reach  # the distance, negative inside; or a function of the nearest places
+    reach: float | Reach  # the distance, negative inside; or a function of the nearest points
     # around edges and corners the surface follows the planes of the faces there up to this multiple of the distance;
     # where they meet farther out it is cut off by a ball. With 1 it is round: a level of the distance to the solid
     limit: float = 1.0
 
     @property
     def level(self) -> float | None:
-        """The level of distance that the surface is; None if it varies or is mitred."""
+        """The distance of which the surface is a level set; None if it varies or edges are mitred."""
         return None if callable(self.reach) or (self.limit > 1 and self.reach != 0) else self.reach
 
     @property
@@ -70,7 +70,7 @@ class Offset:
         return heights, gradients
 
     def _heights(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n,) heights, and (n, 3) gradients that ignore how the distance varies."""
+        """(n,) heights above the surface, and (n, 3) gradients that ignore how `reach` varies."""
         closest = self.solid.closest(points)
         heights, gradients = closest.distances, closest.gradients
         reach = self.reach(closest.points) if callable(self.reach) else np.full(len(points), self.reach)
@@ -79,7 +79,7 @@ class Offset:
         return heights - reach, gradients
 
     def planes(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n, 3) places on the surface near points, and its normals there; at level 0 those of nearest triangles."""
+        """(n, 3) points on the surface near given ones, and (n, 3) normals there; at level 0 of nearest triangles."""
         if self.level == 0:
             tree = self.solid.tree
             nearest = tree.search(points)
@@ -90,12 +90,16 @@ class Offset:
     def _mitred(
         self, away: Floats, places: Floats, heights: Floats, gradients: Floats, reach: Floats
     ) -> tuple[Floats, Floats]:
-        """(n,) heights above the planes of the faces at the nearest places, within the limit; and (n, 3) gradients."""
+        """(n,) heights above planes of the faces at the nearest points `places`, up to the limit; (n, 3) gradients.
+
+        `away` are (n, 3) vectors from the nearest points, `heights` and `gradients` those of distance to the solid, and
+        `reach` the (n,) distances of the surface.
+        """
         far = np.abs(heights)
         near = np.flatnonzero((heights * reach > 0) & (far >= np.abs(reach)) & (far < 2 * self.limit * np.abs(reach)))
         if not len(near):
             return heights, gradients
-        sides = np.sign(reach[near])
+        signs = np.sign(reach[near])
         features, tree = self.solid.tree.features, self.solid.tree.tree
         slack = MEETING_DISTANCE * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
@@ -103,11 +107,11 @@ class Offset:
             starts, faces = tree.meeting(np.repeat(rows[:, None, :3], 3, axis=1), slack)
             return _steepest(features.rows, starts, faces, self._normals, rows, slack)
 
-        above, faces = in_chunks(part, np.concatenate([places[near], sides[:, None] * away[near]], axis=1))
+        above, faces = in_chunks(part, np.concatenate([places[near], signs[:, None] * away[near]], axis=1))
         beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # heights above the ball that cuts off corners
         planar = (faces >= 0) & (above > beyond)
         heights, gradients = heights.copy(), gradients.copy()
-        heights[near] = sides * np.where(faces >= 0, np.maximum(above, beyond), far[near])
+        heights[near] = signs * np.where(faces >= 0, np.maximum(above, beyond), far[near])
         gradients[near[planar]] = self._normals[faces[planar]]
         return heights, gradients
 
@@ -118,7 +122,7 @@ class Offset:
         return np.where(self.solid.bounding[features.ids][:, None], features.face_normals, 0.0)
 
     def _variation(self, points: Floats) -> Floats:
-        """(n, 3) gradients of the distance of the surface, at the nearest places of points."""
+        """(n, 3) gradients of `reach` at the nearest points of (n, 3) points, by central differences."""
         assert callable(self.reach)
         step = DIFFERENCE_STEP * float(np.ptp(self.solid.tree.tree.bounds[1].reshape(2, 3), axis=0).max())
         around = (points[:, None] + step * ALONG_AXES).reshape(-1, 3)
@@ -127,7 +131,7 @@ class Offset:
 
 
 def checked_reach(reach: Reach) -> Reach:
-    """Wrap a function of places so that anything but finite numbers is refused."""
+    """Wrap a function of (n, 3) points so that it raises unless it returns (n,) finite numbers."""
 
     def called(places: Floats) -> Floats:
         values = np.asarray(reach(places), dtype=np.float64)
@@ -146,9 +150,10 @@ def checked_reach(reach: Reach) -> Reach:
 def _steepest(
     rows: Floats, starts: Ints, faces: Ints, normals: Floats, places: Floats, slack: float
 ) -> tuple[Floats, Ints]:
-    """Find (n,) the triangle at each place above whose plane its point is highest, or −1; and this height.
+    """(n,) heights of points above the plane, of the triangles that meet at a place, it is highest above; (n,) which.
 
-    Near place p are the triangles ``faces[starts[p]:starts[p + 1]]``.
+    A row of `places`, (n, 6), holds a place, and the vector from there to a point. Near place p are the triangles
+    ``faces[starts[p]:starts[p + 1]]``; those with normals 0 do not count. Without any, they are −∞ and −1.
     """
     heights, steepest = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
     for p in range(len(places)):
@@ -164,7 +169,7 @@ def _steepest(
 
 
 OFF_SYMMETRY = 1e-7
-"""Places are moved off planes of symmetry by this share of a cell before they are measured."""
+"""Points are moved off planes of symmetry by this share of a cell before distance is measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,19 +177,19 @@ class SheetWall:
     """A solid around a surface, between two heights, whose sides stand upright on the rim of the surface."""
 
     tree: FaceTree
-    origin: Floats  # (3,) place that is moved to 0, with the faces
-    step: float  # by which points are moved off planes of symmetry, where a face and a rim standing on it are as near
+    origin: Floats  # (3,) point that becomes the origin of faces and points
+    step: float  # by which points are moved off planes of symmetry, where a face and a rim are equally near
     above: float  # height of the solid in front of the surface
     below: float  # its height behind the surface
     rim: TriangleTree | None  # the r sides of the rim, as triangles without area; None if the surface is closed
     corners: Floats  # (r, 2, 3) begin and end of each side of the rim
-    sides: Ints  # (m, 3) the side of the rim that each side of each face is; −1 if it is not on the rim
+    sides: Ints  # (m, 3) number in the rim of each side of each face; −1 if it is not on the rim
     at_vertices: Ints  # (n, 2) the sides of the rim that end and that begin at each vertex; −1 where there are none
     outward: Floats  # (r + 1, 2, 3) directions away from the surface at begin and end of each side; last 0, for −1
 
     @classmethod
-    def around(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
-        """Make the wall around meshes of triangles or polygons."""
+    def sides_at(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
+        """Make the wall around meshes of triangles or polygons, to be evaluated on a grid."""
         for part in as_list(sheet):
             if area_elements(part).corners.shape[1:] != (3, grid.dimension):
                 raise SourceError(
@@ -199,25 +204,25 @@ class SheetWall:
             raise SourceError("all faces of the sheet are degenerate", remedy="check its vertices")
         ends = np.stack([features.faces, np.roll(features.faces, -1, axis=1)], axis=-1)
         on_rim = (np.bincount(features.edges.ravel()) == 1)[features.edges]
-        places = features.vertices[ends[on_rim]]
-        along = unit(places[:, 1] - places[:, 0])
+        rim_corners = features.vertices[ends[on_rim]]
+        along = unit(rim_corners[:, 1] - rim_corners[:, 0])
         outward = np.cross(along, np.repeat(features.face_normals, on_rim.sum(axis=1), axis=0))
         sides = np.full(features.faces.shape, -1)
-        sides[on_rim] = np.arange(len(places))
-        around = np.full((len(features.vertices), 2), -1)  # the side that ends at each vertex, and that which begins
-        around[ends[on_rim][:, 1], 0] = around[ends[on_rim][:, 0], 1] = np.arange(len(places))
+        sides[on_rim] = np.arange(len(rim_corners))
+        sides_at = np.full((len(features.vertices), 2), -1)  # the side that ends at each vertex, and that which begins
+        sides_at[ends[on_rim][:, 1], 0] = sides_at[ends[on_rim][:, 0], 1] = np.arange(len(rim_corners))
         at_ends = np.stack([outward, outward], axis=1)
         for end, other in ((0, 0), (1, 1)):  # mean directions where the rim is smooth
-            mates = around[ends[on_rim][:, end], other]
-            smooth = (mates >= 0) & (np.einsum("ni,ni->n", outward, outward[mates]) > SAME_WAY)
-            at_ends[smooth, end] = unit(outward[smooth] + outward[mates[smooth]])
-        rim = TriangleTree.of(places[:, [0, 1, 1]]) if len(places) else None
+            neighbours = sides_at[ends[on_rim][:, end], other]
+            smooth = (neighbours >= 0) & (np.einsum("ni,ni->n", outward, outward[neighbours]) > SAME_WAY)
+            at_ends[smooth, end] = unit(outward[smooth] + outward[neighbours[smooth]])
+        rim = TriangleTree.of(rim_corners[:, [0, 1, 1]]) if len(rim_corners) else None
         outward = np.concatenate([at_ends, np.zeros((1, 2, 3))])
         step = OFF_SYMMETRY * float(grid.spacing.min())
-        return cls(FaceTree.of(features), grid.origin, step, above, below, rim, places, sides, around, outward)
+        return cls(FaceTree.of(features), grid.origin, step, above, below, rim, rim_corners, sides, sides_at, outward)
 
     def depths(self, points: Floats) -> Floats:
-        """(n,) distances of (n, 3) points outside the wall, negative inside."""
+        """(n,) heights of (n, 3) points outside the wall, negative inside; above and below the sheet, distances."""
         points = points - self.origin + self.step
         nearest = self.tree.search(points)
         if self.above == self.below:
@@ -228,7 +233,7 @@ class SheetWall:
         return depths if self.rim is None else np.maximum(depths, self._beyond(points, nearest))
 
     def _beyond(self, points: Floats, nearest_places: NearestFaces) -> Floats:
-        """(n,) distances beyond the rim, negative over the surface."""
+        """(n,) distances of (n, 3) points beyond the rim, negative over the surface, given their nearest points."""
         faces, features = nearest_places.faces, nearest_places.features
         rim_sides = np.full((len(points), 2), -1)
         edges, vertices = (features > 0) & (features < 4), features > 3

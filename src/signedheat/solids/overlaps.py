@@ -31,15 +31,18 @@ from .winding import INSIDE_WINDING, SUMMED_POINTS
 
 
 def directed(triangles: Floats, counts: Floats | Ints) -> Floats:
-    """(k, 3, 3) triangles, repeated by their counts, and reversed where these are negative."""
+    """(k, 3, 3) triangles: each of (m, 3, 3) repeated by its count, and reversed where the count is negative."""
     copies = np.repeat(np.arange(len(counts)), np.abs(counts).astype(np.int64))
     return np.where((counts[copies] < 0)[:, None, None], triangles[copies, ::-1], triangles[copies])
 
 
 def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) -> Floats:
-    """(n,) levels at the centres of `faces`, each due to the triangles of its own group, `counts` times each."""
-    names, labels = np.unique(groups, return_inverse=True)
-    starts, order = grouped(labels, len(names))
+    """(n,) levels at the centres of the (n,) `faces`, each due to the triangles of its own group only.
+
+    Triangles are (m, 3, 3), their `groups` and `counts`, how often each is there, (m,).
+    """
+    unique_groups, labels = np.unique(groups, return_inverse=True)
+    starts, order = grouped(labels, len(unique_groups))
     rank = np.argsort(order)
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
     owners = labels[faces]
@@ -49,13 +52,15 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     for group in np.unique(owners[~summed]):
         chosen = np.flatnonzero(owners == group)
         members = order[starts[group] : starts[group + 1]]
-        tree, some = WindingTree.of(directed(triangles[members], counts[members])), triangles[faces[chosen]]
-        levels[chosen] = tree.levels(some.mean(axis=1), unit(area_vectors(some)), face_areas(some))
+        tree, chosen_triangles = WindingTree.of(directed(triangles[members], counts[members])), triangles[faces[chosen]]
+        levels[chosen] = tree.levels(
+            chosen_triangles.mean(axis=1), unit(area_vectors(chosen_triangles)), face_areas(chosen_triangles)
+        )
     return levels
 
 
 def levels_of_pieces(pieces: Pieces) -> Floats:
-    """(p,) mean level of each piece by itself."""
+    """(p,) mean level on each piece, due to this piece only."""
     faces, _ = sampled(pieces, 4096)
     levels = levels_within(pieces.triangles, pieces.labels, np.ones(len(pieces.labels), dtype=np.int64), faces)
     owners = pieces.labels[faces]
@@ -64,7 +69,10 @@ def levels_of_pieces(pieces: Pieces) -> Floats:
 
 @compiled
 def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups: Ints) -> Floats:
-    """(n,) levels at the centres of faces, summed over the triangles of their groups."""
+    """(n,) levels at the centres of `faces`, summed over the triangles of their `groups`, (n,) both.
+
+    Triangles have (m, 9) `corners`, group by group from `starts` on, and (m,) `counts`.
+    """
     levels = np.zeros(len(faces))
     for row in range(len(faces)):
         i, group = faces[row], groups[row]
@@ -84,32 +92,36 @@ SHEET = 0.146
 """Level below which a piece bounds nothing: its squared distance from ½ is more than half of that of a flat sheet,
 (½ − 0.146)² = ½ · ¼. Flat and wavy sheets have 0, a seventh of a ball 0.16, half of one 0.31, all of it ½."""
 HINT = 0.25
-"""A piece was given as facing one way if the area that does so exceeds the rest by this share of the whole. Halved, it
-changes nothing; doubled, hidden bodies of which a fifth of the faces are flipped become cavities in 8 of 12 scenes."""
+"""The given orientation of a piece is trusted if the area that faces one way exceeds the rest by this share of all.
+Half of it changes nothing; with twice as much, hidden bodies with a fifth of their faces flipped become cavities in 8
+of 12 scenes."""
 OUTSIDE = 0.05
-"""Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within if at most this
-share of its rims is outside. Half of the rims of the inside of a bowl or a vase lie outside its outside."""
+"""Two bodies overlap if a larger share of the area of one lies outside the other; a body lies within another one if at
+most this share of its rims is outside. Half of the rims of the inside of a bowl or a vase lie outside its outside."""
 
 
 class Rims(NamedTuple):
-    """Edges where pieces end: (k, 3) middles, (k,) lengths and (k,) pieces."""
+    """Boundary edges of pieces."""
 
-    middles: Floats
-    lengths: Floats
-    owners: Ints
+    middles: Floats  # (k, 3) midpoints
+    lengths: Floats  # (k,)
+    owners: Ints  # (k,) piece of each edge
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """Bodies: single pieces that are bodies by themselves, and groups of other pieces that are."""
 
-    numbers: Ints  # (p,) the body that each piece is of, or −1
+    numbers: Ints  # (p,) the body that each piece belongs to, or −1
     levels: Floats  # (b,) levels of the bodies as their pieces are directed, negative if they face inwards
     as_given: Bools  # (b,) which were clearly given as bodies that face outwards
 
     @classmethod
     def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
-        """Find the bodies among directed pieces; `given` is the area of each that faces as given, less the rest."""
+        """Find the bodies among oriented pieces, with corners `directed`, (m, 3, 3), and (p,) groups.
+
+        `alone` are the (p,) levels of pieces by themselves, `given` the (p,) area that faces as given, less the rest.
+        """
         n = len(groups)
         itself = np.abs(alone) >= SHEET
         names, owners = np.unique(np.where(itself, n + np.arange(n), groups), return_inverse=True)
@@ -133,11 +145,12 @@ def bodies_around(
     nested: Nesting,
     united: bool,
 ) -> Floats:
-    """(n,) winding numbers, at the places of a system, of the bodies that each place ignores.
+    """(n,) winding number, at each sample of a system, of the bodies that this sample ignores.
 
-    A place counts its own body, the body in which this is a cavity, and cavities in it; it ignores all others.
-    `nested` decides which bodies within others are cavities; bodies that overlap ignore each other if they are to be
-    `united`.
+    A sample counts its own body, the body in which this is a cavity, and cavities in it. It ignores all others.
+    `nested` decides which bodies within others are cavities. Bodies that overlap ignore each other if they are to be
+    `united`. For `groups`, `alone` and `given` see `Bodies.of`; `signs` are those of the (p,) pieces, and `closed` the
+    (k, 3, 3) triangles of closed pieces.
     """
     triangles = directed(pieces.triangles, signs[pieces.labels])
     bodies = Bodies.of(pieces, triangles, groups, alone, signs * given)
@@ -163,7 +176,7 @@ def bodies_around(
     on_rim = np.arange(len(places)) >= n
 
     def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
-        """Average values over the chosen places of one body, 0 outside the box of the other, for pairs of bodies."""
+        """Average values over chosen places of body `one`, counting 0 outside the box of `other`, for pairs of both."""
         entries, shape = weights[rows] * chosen[rows] * values, (count + 1, count + 1)
         sums = sparse.coo_array((entries, (homes_there, others)), shape=shape).tocsr()
         total = np.bincount(homes, weights * chosen, count + 1)
@@ -185,7 +198,10 @@ def bodies_around(
 
 
 def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
-    """(k,) places in the boxes of bodies, (k,) these bodies, and (k,) their winding numbers, means of both sides."""
+    """Pair (n, 3) places with the bodies in whose boxes they lie: (k,) places, (k,) bodies, (k,) winding numbers.
+
+    A body is (m, 3, 3) triangles of `parts`. On its surface, its winding number is the mean of both sides.
+    """
     boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
     # a point is a triangle whose corners are equal
     starts, bodies = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))

@@ -1,4 +1,4 @@
-"""Normals of point clouds: fitted where there are none, turned outwards, and surfaces fitted to them."""
+"""Normals of point clouds: fitted where there are none, and oriented outwards; and surfaces fitted to points."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from ..surfaces.plane_fits import point_spacing
 from ..surfaces.point_cloud import PointCloud
 
 STRAY_DISTANCE = 3.0
-"""A point is a stray if its distance to the nearest points is this many times that of the points around it."""
+"""A point is a stray if its distance to the nearest points is more than this many times that of the points around."""
 STRAY_NEIGHBORS = 4, 64
-"""Number of nearest points whose mean distance counts, and of points around with which it is compared: so many that
-most of them lie on the surface, though strays may have other strays near them."""
+"""Number of nearest points to which the mean distance is measured, and number of points around with which it is
+compared. These are so many that most of them lie on the surface, even if strays are near other strays."""
 
 
 def without_strays(cloud: PointCloud) -> tuple[PointCloud, list[StrayPoints]]:
-    """Leave out points that lie far from all others, compared with the points around them."""
+    """Leave out points that lie far from all others, compared with the points around them; say how many in a note."""
     ids, owners = np.unique(cloud.representatives, return_inverse=True)
     few, many = STRAY_NEIGHBORS
     many = min(many, len(ids) // 4)
@@ -38,7 +38,7 @@ def without_strays(cloud: PointCloud) -> tuple[PointCloud, list[StrayPoints]]:
 
 
 def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
-    """Turn the normals of a point cloud outwards, or fit them if it has none; most given normals may be inverted."""
+    """Orient the normals of a point cloud outwards, or fit them if it has none; say how many were flipped or fitted."""
     if cloud.points.shape[1] != 3:
         raise GeometryError(
             f"point clouds are oriented in space: points need 3 coordinates, not {cloud.points.shape[1]}",
@@ -65,23 +65,23 @@ def orient_points(cloud: PointCloud) -> tuple[PointCloud, OrientedPoints]:
 
 
 FIT_NEIGHBORS = 30
-"""Number of nearest points for each node."""
+"""Number of nearest points that are searched for each node."""
 WEIGHTED_POINTS = 12
-"""Number of them that get a weight: the nearest of those that face along ∇φ."""
+"""Number of points that get a weight at a node: the nearest of those that face along ∇φ."""
 FACING_COSINE = 0.3
 """Cosine between normal and ∇φ above which a point faces along ∇φ."""
 FIT_WIDTH = 2.0
-"""Width of the fit on both sides of the zero set, in cells, as a cubic interpolant needs."""
+"""The fit replaces φ at nodes where |φ| is below this number of cells, as a cubic interpolant needs."""
 FIT_REACH = 1.5
-"""The fit has full weight within this distance of points, in mean gaps; one gap farther it has none."""
+"""The fit has full weight within this distance of points, in mean spacings; one spacing farther it has none."""
 
 
 def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats) -> Floats:
-    """Move the zero set of φ, (nx, ny, nz), at nodes `steps` apart, onto a smooth surface through oriented points.
+    """Return φ, (nx, ny, nz), with its zero set moved onto a smooth surface through oriented points.
 
-    Near it φ becomes the weighted mean of ``½ (n_i + n) · (x − p_i)`` over points p_i, where n is the mean of their
-    normals n_i: planes with normals n_i and n lie on opposite sides of a curved surface. Positions are relative to the
-    first node. Points whose normals are against ∇φ do not count.
+    Nodes are (3,) `steps` apart, and the (n, 3) points relative to the first node. Near the zero set φ becomes the
+    weighted mean of ``½ (n_i + n) · (x − p_i)`` over points p_i, where n is the mean of their normals n_i: planes with
+    normals n_i and n lie on opposite sides of a curved surface. Points whose normals are against ∇φ do not count.
     """
     tree = PointTree(points)
     n_neighbours = min(FIT_NEIGHBORS, len(points))
@@ -89,29 +89,30 @@ def fitted_to_points(phi: Floats, steps: Floats, points: Floats, normals: Floats
     result = np.array(phi, dtype=np.float64)
     nodes = np.argwhere(np.abs(phi) < FIT_WIDTH * float(steps.max()))
 
-    def moves(rows: Ints) -> tuple[Floats]:
-        places, along = rows * steps, unit(_slopes(phi, rows, steps))
-        reach, near = tree.query(places, k=[*range(1, n_neighbours + 1)])
-        heights, share = _fit(places, along, reach, points[near], normals[near], gap)
-        return (share * (heights - phi[tuple(rows.T)]),)
+    def changes(rows: Ints) -> tuple[Floats]:
+        """(k,) changes of φ at (k, 3) nodes."""
+        positions, directions = rows * steps, unit(_gradients(phi, rows, steps))
+        distances, near = tree.query(positions, k=[*range(1, n_neighbours + 1)])
+        heights, weights = _fit(positions, directions, distances, points[near], normals[near], gap)
+        return (weights * (heights - phi[tuple(rows.T)]),)
 
-    result[tuple(nodes.T)] += in_chunks(moves, nodes)[0]
+    result[tuple(nodes.T)] += in_chunks(changes, nodes)[0]
     return result
 
 
-def _slopes(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
-    """(k, 3) gradients of φ at nodes by central differences, one-sided at the boundary of the grid."""
-    slopes = np.empty((len(nodes), 3))
+def _gradients(phi: Floats, nodes: Ints, steps: Floats) -> Floats:
+    """(k, 3) gradients of φ at (k, 3) nodes by central differences, one-sided at the boundary of the grid."""
+    gradients = np.empty((len(nodes), 3))
     for axis, step in enumerate(steps):
         low, high = nodes.copy(), nodes.copy()
         low[:, axis] = np.maximum(low[:, axis] - 1, 0)
         high[:, axis] = np.minimum(high[:, axis] + 1, phi.shape[axis] - 1)
-        slopes[:, axis] = (phi[tuple(high.T)] - phi[tuple(low.T)]) / ((high[:, axis] - low[:, axis]) * step)
-    return slopes
+        gradients[:, axis] = (phi[tuple(high.T)] - phi[tuple(low.T)]) / ((high[:, axis] - low[:, axis]) * step)
+    return gradients
 
 
 def mean_gap(points: Floats) -> float:
-    """Return the root of the area per point, taken from discs around (n, 3) points up to their sixth neighbours."""
+    """Return the mean spacing of (n, 3) points on a surface: the root of the area per point, by six neighbours each."""
     reach = PointTree(points).query(points, k=[min(7, len(points))])[0]
     return float(np.median(point_spacing(reach, 7)))
 
@@ -119,7 +120,11 @@ def mean_gap(points: Floats) -> float:
 def _fit(
     places: Floats, ahead: Floats, reach: Floats, points: Floats, normals: Floats, gap: float
 ) -> tuple[Floats, Floats]:
-    """(k,) height of each place above the surface through the (k, n, 3) points around it, and (k,) its weight."""
+    """(k,) heights of (k, 3) places above the surface through the (k, n, 3) points around each, and (k,) weights.
+
+    `ahead` are (k, 3) directions of ∇φ at the places, `reach` the (k, n) distances to the points, and `gap` their mean
+    spacing. Weights are 1 close to enough points, and fall to 0.
+    """
     cosines = np.einsum("pki,pi->pk", normals, ahead)
     facing = cosines > FACING_COSINE
     ranked = np.sort(np.where(facing, reach, np.inf), axis=1)

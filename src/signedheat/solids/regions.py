@@ -23,8 +23,8 @@ from ..mesh.welding import coincident_faces
 from .winding import INSIDE_WINDING, Windings
 
 TOLERANCES: tuple[float, ...] = (1.0, 10.0, 100.0, 1000.0)
-"""Multiples of the distance below which points are one that are tried until what bounds the inside is closed.
-Of touching boxes with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last distance up to a
+"""Multiples of the tolerance for coinciding points, tried in this order until the faces that bound the inside close.
+Of touching boxes with corners moved by 1e-11 to 1e-5 of their size, none is wrong; without the last multiple up to a
 seventh are, with the first alone nine tenths (`benchmarks/deciding_numbers.py`)."""
 PROBED_FACES = 3
 """Number of faces of each component on both sides of which winding numbers are computed; their median counts."""
@@ -48,9 +48,11 @@ class Regions:
 
     @classmethod
     def of(cls, pieces: Arrangement, windings: Windings, slacks: Floats) -> Regions:
-        """Find the regions of pieces that meet in whole edges and contain the cycle with these winding numbers.
+        """Find on which sides of the faces of an arrangement the inside lies.
 
-        Points on faces are one within the (m,) slacks of the faces that were cut.
+        `windings` gives the winding numbers of the closed surface that these faces contain; they are computed only
+        near a few faces of each component. The (m,) `slacks` are distances within which points on the faces coincided
+        when these were cut; winding numbers are computed farther than that from a face.
         """
         first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
@@ -78,22 +80,22 @@ def cut_and_sided(
     """Cut faces with the first tolerance for which those that bound the inside are closed, and find their regions.
 
     If corners that should coincide are about a tolerance apart, edges stay open or sides contradict each other. Then
-    larger multiples of the (m,) `slacks` of faces are tried; if none works, that with the fewest faults is taken.
-    `closing` tells which of the given faces count in the winding numbers.
+    larger multiples of the (m,) `slacks` of faces are tried; if none works, that with the fewest faults is used.
+    `cut` divides the faces where they meet, for (m,) tolerances; `closing` tells which faces count in winding numbers.
     """
-    tried: list[tuple[Arrangement, Regions]] = []
+    attempts: list[tuple[Arrangement, Regions]] = []
     faults: list[int] = []
     for touching in TOLERANCES:
         pieces = cut(touching * slacks)
-        tried.append((pieces, Regions.of(pieces, windings, touching * slacks)))
-        faults.append(_faults(*tried[-1], closing))
+        attempts.append((pieces, Regions.of(pieces, windings, touching * slacks)))
+        faults.append(_faults(*attempts[-1], closing))
         if not faults[-1]:
             break
-    return tried[int(np.argmin(faults))]
+    return attempts[int(np.argmin(faults))]
 
 
 def _faults(pieces: Arrangement, regions: Regions, closing: Bools) -> int:
-    """Count contradictions, and open edges of what bounds the inside; 0 if nothing is cut."""
+    """Count contradictions, and open edges of the closing faces that bound the inside; 0 if no face was cut."""
     if np.array_equal(pieces.origins, np.arange(len(closing))):
         return 0
     bounds = pieces.faces[regions.bounds & closing[pieces.origins]]
@@ -137,12 +139,12 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     is known there. Directions across edges come from the planes of faces, so that thin triangles have them, too.
     """
     table = edge_table(faces)
-    halfedges = table.pairs[(_ways(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
+    halfedges = table.pairs[(_directions(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
     sides, facing_sides = _facing(table, halfedges.ravel(), halfedges[:, ::-1].ravel())
 
     crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges.ravel()])
     edges, around = np.unique(table.face_edges.ravel()[crowded], return_inverse=True)
-    owners, ways, vertices = crowded // 3, _ways(table, crowded), table.vertices[edges]
+    owners, ways, vertices = crowded // 3, _directions(table, crowded), table.vertices[edges]
     along = points[vertices[:, 1]] - points[vertices[:, 0]]
     lengths, along = np.linalg.norm(along, axis=1), unit(along)
     across = np.cross(normals[owners], ways[:, None] * along[around])
@@ -160,23 +162,27 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     return np.concatenate([sides, beside[0]]), np.concatenate([facing_sides, beside[1]])
 
 
-def _ways(table: EdgeTable, halfedges: Ints) -> Ints:
-    """1 where a halfedge runs along its edge, −1 where it runs against it."""
+def _directions(table: EdgeTable, halfedges: Ints) -> Ints:
+    """(k,) 1 for each halfedge that runs in the direction of its edge, −1 for those that run against it."""
     return np.where(table.forward.ravel()[halfedges], 1, -1)
 
 
 def _facing(table: EdgeTable, turning: Ints, reached: Ints) -> tuple[Ints, Ints]:
-    """Pair sides that face each other, from each halfedge to the next one counterclockwise around its edge."""
+    """Return the two sides that enclose the space between each halfedge and the next counterclockwise around its edge.
+
+    `turning` and `reached` are (k,) halfedges. Side 2 f is behind face f, side 2 f + 1 in front of it.
+    """
     forward = table.forward.ravel()
     return 2 * (turning // 3) + forward[turning], 2 * (reached // 3) + ~forward[reached]
 
 
 @compiled
 def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
-    """Levels of the sides of faces, equal for sides that face each other; their components; number of contradictions.
+    """Return (2 m,) winding numbers up to a constant, (2 m,) components, and the number of contradictions.
 
-    The level in front of a face is less than that behind it by the multiplicity of the face. Pairs of sides that
-    contradict earlier ones are only counted.
+    Side 2 f is behind face f, and side 2 f + 1, in front of it, has a winding number smaller by the multiplicity
+    `times` of the face. The pairs of sides `one` and `other` have equal ones; a pair that contradicts earlier pairs is
+    only counted.
     """
     n, contradictions = 2 * len(times), 0
     parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # levels relative to the parents
@@ -212,7 +218,7 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
 
 
 def widest(pieces: Arrangement) -> Floats:
-    """(p, 3) middle of the widest piece in the cell of each piece."""
+    """(p, 3) centroid of the widest triangle among those in the same cell of the arrangement as each triangle."""
     order = np.lexsort((-heights(pieces.points[pieces.faces]), pieces.cells))
     first = order[np.searchsorted(pieces.cells[order], np.arange(int(pieces.cells.max()) + 1))]
     middles: Floats = pieces.points[pieces.faces[first]].mean(axis=1)[pieces.cells]

@@ -19,21 +19,23 @@ from ..parallel import PointTree
 from ..surfaces.triangle_mesh import TriangleMesh
 
 EDGE_PLACES = 8
-"""Number of places on an edge from which edges that run along it are searched for, nearer together than
+"""Number of sample points on an edge from which other edges along it are searched for. They are closer together than
 `ALONG_EDGE`."""
 ALONG_EDGE = 0.1
 """Two edges run along each other within this distance, relative to the longer one. Chords of the same arc are less than
 0.05 apart if it has 16 or more."""
 MOST_ASKED = 1024
-"""Number of edges of rims that search for edges that run back, before their neighbours do."""
+"""Edges are searched from in about this many groups. If the first edge of a group finds no edge opposite to it, nor do
+the others search."""
 SHARED_PLACES = 3
-"""Number of places of one of two edges that lie along the other. Edges that only meet at a corner share fewer."""
+"""Two edges run along each other if at least this many sample points of one lie along the other. Edges that only meet
+at a corner have fewer."""
 STRAIGHT_RIM = 1e-5
-"""A vertex is no corner if the angle between its two edges is at most this, in radians."""
+"""A vertex is no corner if a loop changes its direction by at most this angle there, in radians."""
 
 
 def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
-    """(k, 2) directed edges that the faces of each part lack, with multiplicity; and (k,) their parts, ascending."""
+    """(k, 2) directed edges that balance the edges of faces in each part, repeated as needed; and (k,) their parts."""
     table = edge_table(faces)
     owners, edges, excess = table.unbalanced(parts)
     ends = table.vertices[edges]
@@ -42,15 +44,15 @@ def open_edges(faces: Ints, parts: Ints) -> tuple[Ints, Ints]:
 
 
 def boundary(faces: Ints) -> Ints:
-    """(k, 2) directed edges that faces lack, with multiplicity: together with them, all edges are balanced."""
+    """(k, 2) directed edges that balance the edges of (m, 3) faces: they run along the gaps, repeated as needed."""
     return open_edges(faces, np.zeros(len(faces), dtype=np.int64))[0]
 
 
 def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
-    """Find closed loops around the gaps of faces, along all boundary edges; no loop passes a vertex twice.
+    """Split the boundary `edges`, (k, 2), of faces into closed loops around gaps, arrays of vertices.
 
-    Where gaps meet at a vertex, an edge is followed by the edge on the other side of the gap beside it. Walks
-    begin far from the middle, so that gaps connected at vertices are separated there.
+    No loop passes a vertex twice. Where gaps meet at a vertex, an edge is followed by the edge on the other side of the
+    gap beside it. Walks begin far from the middle, so that gaps connected at vertices are separated there.
     """
     if not len(edges):
         return []
@@ -81,9 +83,10 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
 
 @compiled
 def _across_gaps(starts: Ints, names: Ints) -> Ints:
-    """Find the edge that follows each in a loop around a gap; gaps at a vertex nest like parentheses.
+    """(e,) the edge that follows each edge in a loop around a gap; gaps at a vertex nest like parentheses.
 
-    `names` lists the edges around each vertex in angular order: e if e leaves it, −1 − e if e arrives.
+    `names` lists the edges around each vertex, from `starts` on, in angular order: e if edge e leaves the vertex, and
+    −1 − e if it arrives.
     """
     following, waiting = np.full(len(names) // 2, -1), np.empty(len(names) // 2, dtype=np.int64)
     for v in range(len(starts) - 1):
@@ -102,7 +105,7 @@ def _across_gaps(starts: Ints, names: Ints) -> Ints:
 
 @compiled
 def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) -> tuple[Ints, Ints]:
-    """Return edges loop by loop, and the end of each loop; walks along edges begin at the first edges in `order`."""
+    """Return edges loop by loop, and where each loop ends; walks along `following` edges begin in the order `order`."""
     n = len(tails)
     place, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     edges, stops, count, n_loops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0
@@ -129,23 +132,26 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
 
 
 def turning(points: Floats, following: Ints) -> Bools:
-    """(n,) whether closed loops do not go straight on at their points, given the point after each one."""
+    """(n,) whether closed loops change their direction at (n, 3) points; `following` is the next point of each."""
     ways, turns = unit(points[following] - points), np.empty(points.shape)
     turns[following] = ways[following] - ways
     return np.asarray(np.linalg.norm(turns, axis=1) > STRAIGHT_RIM)
 
 
 def corners_of(points: Floats) -> Ints:
-    """(k,) corners of a closed loop: points where it does not go straight on."""
+    """(k,) corners of a closed loop of (n, 3) points: the indices where it changes its direction."""
     return np.flatnonzero(turning(points, next_in_groups(np.array([0, len(points)]))))
 
 
 def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
-    """Find pairs of edges, not with the same ends, that run along each other, in one direction or the other."""
+    """Find pairs of edges that run along each other, in either direction, but do not have the same ends.
+
+    Edges are given by (n, 2, 3) ends; pairs are two (k,) arrays of their indices.
+    """
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
     ways = along / np.maximum(lengths, 1e-300)[:, None]
-    places, owners = _places_on(ends)
+    places, owners = _points_on(ends)
     tree, reach = PointTree(places), ALONG_EDGE * lengths[owners]
     crowded = np.flatnonzero(tree.query(places, 2)[0][:, 1] <= reach)  # each place finds itself, too
     near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
@@ -165,9 +171,10 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
 def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     """Find pairs of directed edges that run along each other in opposite directions, within (n,) reaches of both.
 
-    Each place on an edge has one partner: the nearest place, direction included. The time is O(n log n).
+    Edges are given by (n, 2, 3) ends; pairs are two (k,) arrays of their indices. Each sample point on an edge has one
+    partner, which is nearest in position and direction. The time is O(n log n).
     """
-    ways, (places, owners) = unit(ends[:, 1] - ends[:, 0]), _places_on(ends)
+    ways, (places, owners) = unit(ends[:, 1] - ends[:, 0]), _points_on(ends)
     partners = np.full((len(ends), EDGE_PLACES), -1)
     sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))
     groups = np.arange(len(ends)) // (1 + len(ends) // MOST_ASKED)
@@ -199,17 +206,17 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     return one, another
 
 
-def _places_on(ends: Floats) -> tuple[Floats, Ints]:
-    """Return places on edges, `EDGE_PLACES` on each, and the edge of each."""
+def _points_on(ends: Floats) -> tuple[Floats, Ints]:
+    """Return `EDGE_PLACES` points on each edge, with (n, 2, 3) ends: (k, 3) positions, and (k,) their edges."""
     shares = (np.arange(EDGE_PLACES) + 0.5) / EDGE_PLACES
     places = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
     return places.reshape(-1, 3), np.repeat(np.arange(len(ends)), EDGE_PLACES)
 
 
 def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
-    """Divide faces along the open edges of others that lie in them, as a roof above walls; return origins, too.
+    """Divide faces along the open edges of others that lie in them, such as a roof along the tops of walls.
 
-    So what a face bounds can end in the middle of it.
+    Return the mesh, and the face that each of its faces is part of. So only a part of a face may bound something.
     """
     points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
     table = edge_table(faces)

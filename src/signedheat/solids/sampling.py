@@ -35,21 +35,23 @@ def sample_distances(
 ) -> Samples:
     """Sample points with distances and gradients, near the surface of a shape and around it.
 
-    Points near the surface are points on it, uniform in area, moved by normal noise along each axis. The others are
+    Points near the surface are drawn uniformly on it and then moved by Gaussian noise along each axis. The others are
     uniform in the cube around the bounding sphere. Distances are exact (`Solid.closest`), not interpolated.
 
     Parameters
     ----------
     shape : Field, Solid or shape
-        A distance in space, from `signed_distance` or ``sharpen(field, shape)``, a solid, or a shape, completed here.
+        A shape, which is completed to a solid; a solid; or a field on a grid that comes from one, as those of
+        `signed_distance` and ``sharpen(field, shape)`` do.
     n : int
         Number of points.
     near : float
-        Fraction of the points near the surface.
+        Fraction of the points that are drawn near the surface, from 0 to 1.
     widths : sequence of float
-        Standard deviations of the noise, relative to the radius of the shape, for equal numbers of points.
+        Standard deviations of the noise, relative to the radius of the bounding sphere. Each is used for an equal
+        number of points.
     seed : int
-        The same seed gives the same points.
+        Seed of the random numbers.
 
     Returns
     -------
@@ -111,8 +113,8 @@ def sample_distances(
     points = np.empty((n, 3))
     ends = np.rint(np.linspace(0, n_near, len(scales) + 1)).astype(int)
     for start, stop, width in zip(ends[:-1], ends[1:], scales, strict=True):
-        places, _ = evenly_on(triangles, stop - start, random)
-        points[start:stop] = places + random.normal(scale=width * radius, size=places.shape)
+        on_surface, _ = evenly_on(triangles, stop - start, random)
+        points[start:stop] = on_surface + random.normal(scale=width * radius, size=on_surface.shape)
     points[n_near:] = center + radius * random.uniform(-1.0, 1.0, (n - n_near, 3))
     closest = solid.closest(points)
     is_near = np.arange(n) < n_near
@@ -120,7 +122,7 @@ def sample_distances(
 
 
 def evenly_on(triangles: Floats, n: int, random: np.random.Generator) -> tuple[Floats, Ints]:
-    """(n, 3) points on triangles, stratified by area; and the triangle of each."""
+    """Sample n points on (m, 3, 3) triangles, stratified by area: (n, 3) positions, and (n,) triangles they are on."""
     a, b, c = triangles.transpose(1, 0, 2)
     areas = np.cumsum(face_areas(triangles))
     marks = (np.arange(n) + random.random(n)) / max(n, 1) * areas[-1]
@@ -139,11 +141,12 @@ SHARP_ANGLE = np.deg2rad(30.0)
 def training_points(
     surface: TriangleMesh, n: int, normalize: bool = False
 ) -> tuple[dict[str, NDArray[np.float32]], dict[str, NDArray[np.float32]]]:
-    """Sample n points of each kind in single precision: on a closed surface, and around it with signed distances.
+    """Sample float32 training data from a closed surface: arrays of points on it, and of points around it.
 
-    On it: (n, 6) positions and normals, by area and along sharp edges. Around it: (n, 3) points in the cube around its
-    bounding sphere, and near the surface, with (n,) distances named ``…_label``. With `normalize`, the surface is
-    scaled to the unit sphere first.
+    The first dict has (n, 6) positions and normals: ``random_surface`` uniform by area, ``sharp_surface`` along sharp
+    edges. The second has (n, 3) points in the cube around the bounding sphere, ``vol_points``, and near the points of
+    the first dict, ``random_near_points`` and ``sharp_near_points``. Their (n,) signed distances are named ``…_label``
+    instead. With `normalize`, the surface is scaled to the unit sphere first.
     """
     random = np.random.default_rng(0)
     lower, upper = surface.bounds
@@ -153,22 +156,22 @@ def training_points(
         surface = TriangleMesh((surface.vertices - center) / radius, surface.faces)
         center, radius = np.zeros(3), 1.0
     solid = complete(surface, as_oriented=True)
-    places, faces = evenly_on(surface.vertices[surface.faces], n, random)
-    directions = unit(surface.face_area_vectors)[faces]
-    on = {"random_surface": (places, directions), "sharp_surface": _on_sharp_edges(surface, n, random)}
-    around = {"vol": center + radius * random.uniform(-1.0, 1.0, (n, 3))}
-    for name, (middles, _) in zip(("random_near", "sharp_near"), on.values(), strict=True):
+    points_on, faces = evenly_on(surface.vertices[surface.faces], n, random)
+    normals = unit(surface.face_area_vectors)[faces]
+    on_surface = {"random_surface": (points_on, normals), "sharp_surface": _on_sharp_edges(surface, n, random)}
+    around_surface = {"vol": center + radius * random.uniform(-1.0, 1.0, (n, 3))}
+    for name, (middles, _) in zip(("random_near", "sharp_near"), on_surface.values(), strict=True):
         widths = radius * np.resize(NOISE_WIDTHS, len(middles))
-        around[name] = middles + widths[:, None] * random.normal(size=middles.shape)
-    labelled: dict[str, Floats] = {}
-    for name, points in around.items():
-        labelled |= {f"{name}_points": points, f"{name}_label": solid.distance(points)}
-    kept = {name: np.concatenate(both, axis=1).astype(np.float32) for name, both in on.items()}
-    return kept, {name: values.astype(np.float32) for name, values in labelled.items()}
+        around_surface[name] = middles + widths[:, None] * random.normal(size=middles.shape)
+    with_distances: dict[str, Floats] = {}
+    for name, points in around_surface.items():
+        with_distances |= {f"{name}_points": points, f"{name}_label": solid.distance(points)}
+    single_precision = {name: np.concatenate(both, axis=1).astype(np.float32) for name, both in on_surface.items()}
+    return single_precision, {name: values.astype(np.float32) for name, values in with_distances.items()}
 
 
 def _on_sharp_edges(surface: TriangleMesh, n: int, random: np.random.Generator) -> tuple[Floats, Floats]:
-    """(n, 3) places uniform along sharp edges, and (n, 3) mean normals of both sides; none without such edges."""
+    """(n, 3) points uniform along sharp edges, and (n, 3) mean unit normals there; empty if no edge is sharp."""
     _, normals, pairs = bent_edges(surface.vertices, surface.faces, SHARP_ANGLE)
     if not len(pairs):
         return np.zeros((0, 3)), np.zeros((0, 3))
@@ -176,5 +179,5 @@ def _on_sharp_edges(surface: TriangleMesh, n: int, random: np.random.Generator) 
     ends = np.cumsum(np.linalg.norm(heads - tails, axis=1))
     marks = (np.arange(n) + random.random(n)) / n * ends[-1]
     edges = np.minimum(np.searchsorted(ends, marks, side="right"), len(ends) - 1)
-    places = tails[edges] + random.random((n, 1)) * (heads - tails)[edges]
-    return places, unit(normals[pairs // 3].sum(axis=1))[edges]
+    points = tails[edges] + random.random((n, 1)) * (heads - tails)[edges]
+    return points, unit(normals[pairs // 3].sum(axis=1))[edges]

@@ -52,8 +52,8 @@ def simplified(mesh: TriangleMesh, tolerance: float) -> TriangleMesh:
 def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
     """Whether all of a surface lies within a distance of another one; False if it is too close to call.
 
-    Distance to a triangle is convex, so it is greatest at the corners of a piece. Pieces near several triangles are cut
-    by planes upright on the sides of the nearest one.
+    Distance to a triangle is convex, so over a face it is greatest at a corner. A face that is not within the distance
+    of a single triangle is divided, and its parts are tested in the same way.
     """
     tree = FaceTree.of(FaceFeatures.of(other.vertices, other.faces))
     pieces = mesh.vertices[mesh.faces]
@@ -72,7 +72,12 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 
 
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
-    """(k, 3, 3) parts of (n, 3, 3) pieces, cut by planes upright on a side of the nearest triangles, or halved."""
+    """(k, 3, 3) triangles that (n, 3, 3) triangles are divided into, for `is_within`.
+
+    `rows` are those of the nearest triangles in `FaceFeatures`. A triangle is cut by the plane that stands on a side of
+    the nearest one, if it reaches farther than `least` to both sides of it. If not, or if it is more than three times
+    as large as the nearest one, it is halved.
+    """
     relative = pieces - rows[:, None, :3]
     p = (relative * rows[:, None, 3:6]).sum(axis=2)
     q = (relative * rows[:, None, 6:9]).sum(axis=2)
@@ -87,7 +92,7 @@ def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
 
 
 def _cut(pieces: Floats, heights: Floats) -> Floats:
-    """(3 n, 3, 3) parts of pieces cut where the (n, 3) heights of their corners change sign."""
+    """(3 n, 3, 3) triangles: each of n is cut in three where the (n, 3) heights of its corners change sign."""
     above = heights > 0
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
     turn = (alone[:, None] + np.arange(3)) % 3

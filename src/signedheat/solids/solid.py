@@ -58,16 +58,16 @@ if TYPE_CHECKING:
     import trimesh
 
 POINTS_SORTED = 1 << 18
-"""Batch size for sorting points."""
+"""Points are sorted in space in batches of this size before they are searched for."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solid(Displayed, Represented, Frozen):
-    """A completed shape: its own faces, and those that close it.
+    """A completed shape: its given faces, and those that close it.
 
-    `complete` returns solids. Distance is to the nearest triangle, and a point is inside if its winding number is above
-    ½: how often the faces go around it, 1 inside a closed surface and 0 outside. Every function that takes a shape also
-    takes a solid, and does not complete it again.
+    `complete` returns solids. Distance is to the nearest triangle. A point is inside if its winding number is above ½,
+    which says how often the faces go around it: 1 inside a closed surface, and 0 outside. Every function that takes a
+    shape also takes a solid, and does not complete it again.
 
     ``a | b``, ``a & b`` and ``a - b`` are the union, intersection and difference of two solids. Their triangles are cut
     where they cross and kept where they bound the result; open sheets are ignored. If one of the two is a `Field`,
@@ -90,7 +90,7 @@ class Solid(Displayed, Represented, Frozen):
     diagnostics : Diagnostics
         Notes on faces that were flipped, left out and added.
     uncrossed : bool
-        Whether the triangles are known not to cross each other, so that nobody need look again.
+        Whether the triangles are known not to cross each other, so that this need not be checked again.
 
     See Also
     --------
@@ -191,16 +191,17 @@ class Solid(Displayed, Represented, Frozen):
     def distance(self, points: ArrayLike, *, signed: bool = True) -> Floats:
         """Compute exact signed distances of points, negative inside, in time O(n log m) on all threads.
 
-        Unsigned distance needs no inside, and is measured only to faces that were given, not to those that complete
-        them: for clothes and other open surfaces, and for networks that learn these. If no face was given, as in a
-        shape of points, it is measured to the completed surface.
+        Unsigned distance is measured only to faces that were given, not to those that complete them. It suits clothes
+        and other open surfaces, and networks that learn these. If no face was given, as in a shape of points, it is
+        measured to the completed surface.
 
         Parameters
         ----------
         points : (..., 3) float
             Positions, in the units of the shape.
         signed : bool
-            Whether distances inside are negative, and to the closed surface.
+            With True, distances are to the closed surface, and negative inside. With False, they are to given faces,
+            and never negative.
 
         Returns
         -------
@@ -250,7 +251,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         (...) bool
-            True inside.
+            True for points inside.
 
         Raises
         ------
@@ -326,11 +327,11 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         resolution : int, optional
-            Nodes along the longest side of a grid around the solid; 128 by default.
+            Number of nodes along the longest side of a grid around the solid; 128 by default.
         spacing : float or (3,) float, optional
-            Distance between its nodes, in place of `resolution`.
+            Distance between nodes, in place of `resolution`, in the units of the shape.
         padding : float, optional
-            Room around the solid; by default a fifth of its longest side.
+            Distance between the solid and the boundary of the grid; by default a fifth of the solid's longest side.
         grid : Grid, optional
             A grid of your own, in place of the one around the solid.
         band : float, optional
@@ -339,15 +340,16 @@ class Solid(Displayed, Represented, Frozen):
             Folder for the values of a band, which are mapped into memory as they are used. A second run resumes where
             the first was stopped. Workers must be able to read and write it.
         scheduler : concurrent.futures.Executor, distributed.Client or str, optional
-            Computes the tiles of a store. By default, threads of this process. Or a pool, such as a
-            `ProcessPoolExecutor`, or a Dask cluster, by its client or its address, such as ``"tcp://127.0.0.1:8786"``.
+            What computes the tiles of a store: a pool, such as a `ProcessPoolExecutor`, or a Dask cluster, by its
+            client or its address, such as ``"tcp://127.0.0.1:8786"``. By default, threads of this process.
         progress : callable, optional
             Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
         Returns
         -------
         Field
-            On the grid, or a `Band` of it. Its calls, closest points and contours are exact, since it keeps the solid.
+            Signed distances on the grid, or on a `Band` of it. Interpolation, closest points and contours of it are
+            exact, since it keeps the solid.
 
         Raises
         ------
@@ -399,12 +401,12 @@ class Solid(Displayed, Represented, Frozen):
     ) -> TriangleMesh:
         """Return the closed surface of the solid: the input's faces and their completion, or a contour.
 
-        If neither a level nor a grid is asked for, the faces are kept, and cut where bodies overlap. This is exact and
+        Without a level, a spacing or a resolution, the faces are kept, and cut where bodies overlap. This is exact and
         has few triangles. Edges are divided where the completion is finer. Where faces and completion do not join, the
         surface is contoured, with an `InexactWarning` that says where.
 
-        A level, a spacing or a resolution asks for a contour: even triangles in the cells of a grid, with normals
-        towards greater distance. A sharp contour has the edges and corners of the level, and does not intersect itself.
+        With a level, a spacing or a resolution, the result is a contour: triangles of even size in the cells of a grid,
+        with normals towards greater distance. A sharp contour keeps edges and corners, and does not intersect itself.
         Parts thinner than a cell may be missing, with an `InexactWarning` if they are more than edges and tips. Memory
         grows with the surface, not with the grid.
 
@@ -495,11 +497,12 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         distance : float, (n,) float, or callable
-            Positive outside, in the units of the shape; as for `signedheat.offset`.
+            Distance of the surface from the solid, positive outside, in the units of the shape; see
+            `signedheat.offset` for arrays and functions.
         corners : "round", "mitre" or "sharp"
             Shape of edges that the surface moves away from.
         resolution : int
-            Nodes along the longest side.
+            Number of nodes along the longest side of the grid.
         spacing : float or (3,) float, optional
             Distance between nodes, in place of `resolution`.
         progress : callable, optional
@@ -540,16 +543,17 @@ class Solid(Displayed, Represented, Frozen):
         n : int
             Number of points.
         near : float
-            Fraction of the points near the surface.
+            Fraction of the points that are drawn near the surface, from 0 to 1.
         widths : sequence of float
-            Standard deviations of the distance of those points, relative to the radius of the shape.
+            Standard deviations of the noise that moves those points off the surface, relative to the radius of the
+            shape.
         seed : int
             Seed of the random numbers.
 
         Returns
         -------
         Samples
-            The same for the same seed.
+            Points, distances and gradients, with the centre and radius of the shape.
 
         See Also
         --------
@@ -575,8 +579,8 @@ class Solid(Displayed, Represented, Frozen):
     ) -> Section | list[Section]:
         """Cut the solid by a plane, or by parallel planes, and return closed outlines.
 
-        They are exact, and closed however the plane passes through vertices and edges. Where faces lie in the plane,
-        the inside on either side of it counts.
+        The outlines are exact, and closed even if the plane passes through vertices and edges. Where faces lie in the
+        plane, the solid on either side of it counts.
 
         Parameters
         ----------
@@ -590,7 +594,7 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         Section, or list of Section if heights are given
-            Without outlines where a plane misses the solid.
+            The outlines in each plane, none where it misses the solid.
 
         Raises
         ------
@@ -685,17 +689,17 @@ class Solid(Displayed, Represented, Frozen):
         return unions.difference(self, other) if isinstance(other, Solid) else NotImplemented
 
     def field_on(self, field: Field[Grid[Literal[3]]]) -> Field[Grid[Literal[3]]]:
-        """Compute the distance at the nodes of a field, in a band or everywhere.
+        """Compute the signed distance to this solid at the nodes of another field.
 
         Parameters
         ----------
         field : Field
-            On a grid in space or in a band.
+            A field on a grid in space, or in a band of one. Its values are not used.
 
         Returns
         -------
         Field
-            Has values at the same nodes.
+            On the same grid, or in a band of the same width around this solid.
 
         See Also
         --------
@@ -720,13 +724,13 @@ class Solid(Displayed, Represented, Frozen):
         return self.field(grid=domain)
 
     def _surface_on(self, field: Field[Grid[Literal[3]]], level: float) -> TriangleMesh:
-        """Return the contour at a level from a field of distances that is there already, with sharp edges."""
+        """Contour this solid at a level with sharp edges, from a field of its distances that was computed before."""
         # as blocks of the grid hold them, so that both ways give the same mesh
         heights = field.values.astype(np.float32).astype(np.float64) - level
         rounded = heights.astype(np.float32).astype(np.float64)
         return sharp_surface(Offset(self, level), field.domain, heights=rounded)
 
-    def to_pyvista(self) -> pyvista.PolyData:
+    def to_pyvista(self) -> pyvista.PolyData:  # described in `Displayed`
         return self.boundary.to_pyvista()
 
     def to_trimesh(self) -> trimesh.Trimesh:
@@ -800,7 +804,7 @@ class Solid(Displayed, Represented, Frozen):
         files.save_solid(self, path)
 
     def _closest(self, points: Floats) -> tuple[NDArray[Any], ...]:
-        """Return what `Closest` holds, field by field, for (n, 3) points."""
+        """Return the attributes of `Closest`, in order, for (n, 3) points."""
         nearest = self.tree.search(points)
         ids = self.features.ids[nearest.faces]  # of triangles of the solid; `origins` are faces of its source
         signs = np.where(self.windings.inside_near(points, nearest), -1.0, 1.0)
@@ -818,7 +822,10 @@ class Solid(Displayed, Represented, Frozen):
 
 
 def completed_area(triangles: Floats, made: Bools) -> list[Note]:
-    """Return a note on how much of the area of (m, 3, 3) triangles was made by the completion, and where, if any."""
+    """Return a note on how much of the area of (m, 3, 3) triangles was completed, and where; none if nothing was.
+
+    `made` tells which of the (m,) triangles were.
+    """
     if not made.any():
         return []
     areas, corners = face_areas(triangles), triangles[made].reshape(-1, 3)
@@ -828,7 +835,7 @@ def completed_area(triangles: Floats, made: Bools) -> list[Note]:
 
 
 def still_true(notes: Sequence[Note], triangles: Floats, made: Bools) -> tuple[Note, ...]:
-    """Return the notes on solids that were moved or combined, with a new note on the completed area."""
+    """Return the notes of solids that were moved or combined, with a new one on the completed area of the result."""
     others = [note for note in notes if not isinstance(note, CompletedArea)]
     return (*others, *completed_area(triangles, made))
 
@@ -842,12 +849,13 @@ def _mesh(triangles: Floats) -> TriangleMesh:
 
 @transformed.register
 def _(shape: Solid, linear: Floats, move: Floats) -> Solid:
+    """Transform a solid by a (3, 3) linear map, then a (3,) translation; its diagnostics are kept as far as true."""
     corners = slice(None, None, 1 if np.linalg.det(linear) > 0 else -1)
 
     def moved(triangles: Floats) -> Floats:
-        """Transform each corner by itself, so that corners at one place stay equal to the last bit."""
-        places = sum((triangles[..., k, None] * linear[:, k] for k in range(3)), start=np.zeros(3)) + move
-        return np.ascontiguousarray(places[:, corners])
+        """(m, 3, 3) transformed triangles; corners that are equal stay equal to the last bit."""
+        points = sum((triangles[..., k, None] * linear[:, k] for k in range(3)), start=np.zeros(3)) + move
+        return np.ascontiguousarray(points[:, corners])
 
     triangles, closing = moved(shape.triangles), moved(shape.windings.triangles)
     source = None if shape.source is None else cast("TriangleMesh", transformed(shape.source, linear, move))

@@ -2,8 +2,8 @@
 
 At a point of the surface, that ball is tangent from within; its diameter is the local thickness there (Hildebrand &
 Rüegsegger 1997). Only faces that point the other way count as walls, so that edges and rough faces do not make the ball
-small. The ball through a place q is tangent at p if its diameter is |p − q|² / ((p − q) · n); the least of these is
-found by Dinkelbach's method (1967), each step of which asks for the nearest place to the middle of a ball.
+small. The ball through a point q is tangent at p if its diameter is |p − q|² / ((p − q) · n). The least of these is
+found by Dinkelbach's method (1967), each step of which looks for the point nearest to the centre of a ball.
 """
 
 from __future__ import annotations
@@ -41,32 +41,36 @@ from .sampling import evenly_on
 pictures: Any = lazy_module("signedheat.view.surface_pictures", "pictures")
 
 WIDTH_QUANTILE = 0.01
-"""Quantile of the widths of walls, or gaps, that is reported."""
+"""Quantile of the widths of walls, or gaps, that is reported as that of thin walls and narrow gaps."""
 COINCIDENT_FACES = 1e-6
 """Faces at most this far apart coincide (in single precision), relative to the largest coordinate."""
 ROUND_WALL = 4e-3
-"""A round wall of flat faces may reach into a ball by this share of the square of its radius."""
+"""Walls may reach into a ball by this share of its squared radius in the first round of the search, since round walls
+are made of flat faces."""
 FINER = 1e-2
-"""Factor by which that share shrinks in each further round of the search, around the place that the ball touches."""
+"""Factor by which that share shrinks in each further round, which only searches around the point that the ball
+touches."""
 SETTLED = 1e-12
-"""Share at which the search ends: that for flat walls."""
+"""The search ends once that share is as small as this, which flat walls need."""
 
 
 @dataclass(frozen=True)
 class Widths:
-    """Walls and gaps of a shape, at places spread evenly over it."""
+    """Widths of walls and gaps of a shape, in its units, measured at points spread evenly over it.
 
-    # first percentile of the thickness of walls and of the width of gaps; None if no faces are opposite each other
-    wall: float | None
-    gap: float | None
+    Those of walls, or of gaps, are None if no two faces are opposite each other in that way.
+    """
+
+    wall: float | None  # first percentile of the thickness of walls
+    gap: float | None  # first percentile of the width of gaps
     typical_wall: float | None  # medians
     typical_gap: float | None
     thinnest: float | None  # least thickness of all
-    thinnest_place: tuple[float, ...] | None  # (3,) where it is
+    thinnest_place: tuple[float, ...] | None  # (3,) point where it is
 
     @property
     def spacing(self) -> float | None:
-        """Spacing of a grid that has two cells across thin walls and narrow gaps."""
+        """Spacing of a grid that has two cells across thin walls and narrow gaps; None if there are none."""
         widths = [width for width in (self.wall, self.gap) if width is not None]
         return 0.5 * min(widths) if widths else None
 
@@ -256,35 +260,35 @@ def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     halvings = np.log2(np.maximum(2.0 * face_areas(solid.outward), np.finfo(float).tiny)) - 2.0 * np.log2(largest)
     pieces = int(np.exp2(np.clip(np.ceil(halvings), 0.0, 100.0)).sum())
     refuse_beyond_memory(
-        f"thickness at {pieces:,} places",
+        f"thickness at {pieces:,} centres",
         pieces,
         lambda n: 400.0 * n,  # measured on a ball cut into 240,000 pieces
         lambda fits: f"lower the resolution from {parts} to {int(parts * np.sqrt(fits / pieces))}",
     )
     triangles, owners = cut_small(solid.outward, lambda pieces: face_areas(pieces) <= 0.5 * largest * largest)
-    places = triangles.mean(axis=1)
+    centres = triangles.mean(axis=1)
     walls = solid.bounding[solid.features.ids]
     facing = np.where(walls[:, None], solid.features.face_normals, 0.0)
-    values, _ = _diameters(solid.tree, facing, places, _normals_at(solid.outward, owners, places))
+    values, _ = _diameters(solid.tree, facing, centres, _normals_at(solid.outward, owners, centres))
     return Thickness(TriangleMesh(*indexed(triangles)), values, solid.origins[solid.bounding][owners])
 
 
 def widths(shape: Mesh) -> Widths:
-    """Measure walls and gaps between opposite faces without a common corner, at places spread evenly over a shape."""
+    """Measure widths of walls and gaps at points spread evenly over a shape; faces with a common corner have none."""
     mesh, exponent = shape.triangulation, int(np.frexp(np.abs(shape.bounds).max())[1])
     triangles = np.ldexp(mesh.vertices, -exponent)[mesh.faces]  # so that no product leaves the range of numbers
     size = float(np.ldexp(1.0, exponent))
     triangles = triangles[face_areas(triangles) > 0]
     if not len(triangles):
         return Widths(None, None, None, None, None, None)
-    places, faces = evenly_on(triangles, 10_000, np.random.default_rng(0))
-    normals, tree = _normals_at(triangles, faces, places), FaceTree.of_triangles(triangles)
+    points, faces = evenly_on(triangles, 10_000, np.random.default_rng(0))
+    normals, tree = _normals_at(triangles, faces, points), FaceTree.of_triangles(triangles)
     facing = tree.features.face_normals
-    names, ids = indexed(triangles)[1], tree.features.ids
+    corner_ids, ids = indexed(triangles)[1], tree.features.ids
     measured = []
     for side in (1.0, -1.0):
-        diameters, touched = _diameters(tree, side * facing, places, side * normals)
-        folds = (names[faces][:, :, None] == names[ids[touched]][:, None, :]).any(axis=(1, 2))
+        diameters, touched = _diameters(tree, side * facing, points, side * normals)
+        folds = (corner_ids[faces][:, :, None] == corner_ids[ids[touched]][:, None, :]).any(axis=(1, 2))
         measured.append(np.where(folds, np.nan, size * diameters))
     walls, gaps = measured
     thinnest = None if np.isnan(walls).all() else int(np.nanargmin(walls))
@@ -294,14 +298,15 @@ def widths(shape: Mesh) -> Widths:
         typical_wall=_quantile(walls, 0.5),
         typical_gap=_quantile(gaps, 0.5),
         thinnest=None if thinnest is None else float(walls[thinnest]),
-        thinnest_place=None if thinnest is None else tuple((size * places[thinnest]).tolist()),
+        thinnest_place=None if thinnest is None else tuple((size * points[thinnest]).tolist()),
     )
 
 
 def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) -> tuple[Floats, Ints]:
-    """(n,) diameter of the largest ball behind each place, or NaN, and (n,) the face that it touches.
+    """(n,) diameter of the largest ball behind each of (n, 3) places, or NaN, and (n,) the face that it touches.
 
-    Faces whose normal in `facing` is 0 are no walls.
+    `normals` are (n, 3) unit normals at the places, and `facing` (m, 3) those of the faces of the tree, or 0 for faces
+    that are no walls.
     """
     lower, upper = tree.tree.bounds[1, :3], tree.tree.bounds[1, 3:]
     extent = float(np.linalg.norm(upper - lower))
@@ -311,7 +316,7 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
     ways = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
 
     def measured(rays: Floats) -> tuple[Floats, Ints]:
-        """Measure at (k, 6) places and their normals."""
+        """Measure the same for (k, 6) places and their normals."""
         diameters, touched = np.full(len(rays), extent), np.zeros(len(rays), dtype=np.int64)
         rows, boxes = tree.features.rows, tree.tree
         _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, diameters, touched)
@@ -322,7 +327,10 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
 
 
 def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
-    """(n, 3) unit normals at places, interpolated from means at corners: face normals would tilt and shrink balls."""
+    """(n, 3) unit normals at (n, 3) places on (n,) faces of triangles, interpolated from mean normals at corners.
+
+    Unlike them, face normals would tilt balls and make them too small.
+    """
     ids = indexed(triangles)[1]
     flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
     pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > np.cos(CREASE_ANGLE)]
@@ -354,8 +362,12 @@ def _descend(
 ) -> None:
     """Shrink the diameters in `out` at (n, 6) places and their normals until no wall reaches into a ball.
 
+    `touched` becomes the face that each ball touches. `rows` are those of `FaceFeatures`, `facing` the (m, 3) normals
+    of walls, and `bounds`, `discs`, `ways` (bounds of normals) and `items` those of a search tree. Places nearer than
+    `least` to a face coincide with it.
+
     In the first round walls may reach in by `ROUND_WALL`, since a ball that fits a round wall touches all of it. In
-    each further round, near the place that the ball touches, they may do so by `FINER` times as much.
+    each further round, near the point that the ball touches, they may do so by `FINER` times as much.
     """
     leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
     for p in range(len(places)):
@@ -418,7 +430,7 @@ def _descend(
 
 @compiled
 def _square(bounds: Floats, node: int, x: float, y: float, z: float) -> float:
-    """Squared distance of a place to a box; infinite to an empty one."""
+    """Squared distance of a point to the box of a node of the tree; infinite if the node is empty."""
     dx = max(bounds[node, 0] - x, x - bounds[node, 3], 0.0)
     dy = max(bounds[node, 1] - y, y - bounds[node, 4], 0.0)
     dz = max(bounds[node, 2] - z, z - bounds[node, 5], 0.0)

@@ -44,21 +44,22 @@ from ..validation import positive_number, refuse_deleted_folder
 from .winding import Windings
 
 TILE = 8
-"""Blocks along each edge of the tiles of dense grids; small, so that threads finish together."""
+"""Number of blocks along each edge of a tile; small, so that threads finish together."""
 BYTES_PER_DENSE_NODE = 12.0
 """Memory per node for a value and a confidence."""
 BYTES_AT_WORK = 40e6
-"""Measured memory of tiles computed at once, and of compiled kernels."""
+"""Measured memory of the tiles that are computed at the same time, and of compiled kernels."""
 BYTES_IN_BAND = 6.5
 """Memory per node of a band, including its share of the tables of blocks."""
 COARSE_NODES = 65
-"""Approximate maximum of nodes along the coarse grid of a band, whose cells are 2, 4, 8, … times as long."""
+"""Approximate maximum of nodes along an axis of the coarse grid of a band, whose cells are 2, 4, 8, … times as long."""
 FOLLOWED_CUBES, COUNT_FACTOR = 1024, 1.5
-"""Number of cubes of each size followed to estimate the number of blocks, and factor by which this may be wrong."""
+"""Number of cubes of each size that are divided to estimate the number of blocks, and factor by which the estimate may
+be wrong."""
 
 
 class Evaluated(SolidQueries, Protocol):
-    """The part of `Solid` that is used here; importing the class would be circular."""
+    """The part of `Solid` that is used in this module; importing the class would be circular."""
 
     @property
     def origins(self) -> Ints: ...  # (m,) face of the source of each triangle; −1 in the completion
@@ -109,7 +110,10 @@ def band_field(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> Field[Grid[Literal[3]]]:
-    """Compute the signed distance up to `width` from a solid, in memory or a store, and on a coarse grid everywhere."""
+    """Compute signed distance in the blocks of a grid within `width` of a solid, and on a coarse grid everywhere.
+
+    The blocks are kept in memory, or in the folder `store`, whose tiles `scheduler` computes.
+    """
     refuse_plane_grid(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
@@ -149,7 +153,10 @@ def band_field(
 def distances_in(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
-    """Compute (a, b, c) signed distances from node `first` on, NaN at nodes that are in no block; and confidence."""
+    """Compute signed distances at nodes of the blocks at (n, 3) places: (a, b, c) from node `first` on, else NaN.
+
+    Also return the (a, b, c) confidence in the nearest faces.
+    """
     lattice = Lattice(np.array(grid.origin), np.array(grid.spacing), np.array(grid.shape))
     squares, faces = nearest_at_nodes(tree, lattice, first, places)
     values = np.sqrt(squares, out=squares)
@@ -160,7 +167,10 @@ def distances_in(
 def solved(
     tree: FaceTree, windings: Windings, grid: Grid, places: Ints
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
-    """(n, 8, 8, 8) signed distances at the nodes of blocks near each other, NaN beyond the grid; and confidence."""
+    """(n, 8, 8, 8) signed distances at the nodes of blocks at (n, 3) places, NaN beyond the grid; and confidence.
+
+    The places should be near each other, since memory grows with the box around them.
+    """
     first = places.min(axis=0)
     distances, trusted = distances_in(tree, windings, grid, BLOCK * first, places)
     values = np.full((len(places), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
@@ -175,9 +185,9 @@ def solved(
 def _inside(
     tree: FaceTree, windings: Windings, grid: Grid, first: Ints, values: Floats, faces: NDArray[np.int32]
 ) -> Bools:
-    """Find the nodes inside, given their distances and nearest faces.
+    """Find which nodes are inside, given their distances `values` and nearest faces; all arrays are (a, b, c).
 
-    Connected nodes farther than half a step from any surface share one test.
+    `first` is the first node. Connected nodes farther than half a step from any surface share one test.
     """
     origin, steps = grid.origin + first * grid.spacing, grid.spacing
     inside = np.zeros(values.shape, dtype=bool)
@@ -198,7 +208,7 @@ def _inside(
 
 
 def tiles_of(blocks: Blocks) -> list[Ints]:
-    """Group blocks into tiles: return the row numbers of the blocks of each."""
+    """Group blocks into tiles of `TILE`³ blocks: return the row numbers of the blocks of each tile."""
     tiles = blocks.places.astype(np.int64) // TILE
     _, owners = np.unique(tiles, axis=0, return_inverse=True)
     order = np.argsort(owners.ravel(), kind="stable")
@@ -206,18 +216,22 @@ def tiles_of(blocks: Blocks) -> list[Ints]:
 
 
 def coarser(grid: Grid, factor: int) -> Grid:
-    """Return a grid with nodes farther apart by a factor."""
+    """Return a grid that covers the same box, with nodes farther apart by a factor."""
     return Grid(grid.origin, factor * grid.spacing, [max(2, 1 - (-(n - 1) // factor)) for n in grid.shape])
 
 
 def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[Ints, int]:
-    """(n, 3) places of the blocks that may have a node within reach of a face: see `blocks_where`."""
+    """(n, 3) indices of the blocks that may have a node within reach of a face, or none: see `blocks_where`."""
     diagonal = float(np.linalg.norm(grid.spacing))
     return blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
 
 
 def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: float) -> tuple[Ints, int]:
-    """(n, 3) places of blocks that `near` accepts, and 1; over the limit, none, and how much larger cells must be."""
+    """(n, 3) indices of the blocks that `near` accepts, and 1; or none, and the factor by which cells must be larger.
+
+    None are returned if there are more than `limit`. `near` takes the (k, 3) centres of cubes, and half of their edge
+    in nodes, and returns (k,) whether the cubes are to be divided.
+    """
     if math.prod(-(-n // BLOCK) for n in grid.shape) > limit:
         numbers = {side: number for side, _, number in _cubes(grid, near, FOLLOWED_CUBES)}
         if max(numbers.values()) > COUNT_FACTOR * limit:
@@ -229,23 +243,26 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
 
 
 def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
-    """Yield cubes from coarse to fine: blocks per edge, places, and their number, estimated if more than `few`."""
+    """Yield the cubes that `near` accepts, from coarse to fine: blocks per edge, (k, 3) indices, and their number.
+
+    If there are more than `few`, only so many are divided, and the number is an estimate. None means no limit.
+    """
     n_blocks = -(-np.array(grid.shape) // BLOCK)
-    side, each, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
+    side, weight, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
     places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
     while side and len(places):
         half = 0.5 * (side * BLOCK - 1)
         places = places[near(grid.origin + (places * side * BLOCK + half) * grid.spacing, half)]
-        yield side, places, each * len(places)
+        yield side, places, weight * len(places)
         if few is not None and len(places) > few:
-            places, each = random.choice(places, few, replace=False), each * len(places) / few
+            places, weight = random.choice(places, few, replace=False), weight * len(places) / few
         side //= 2
         places = (2 * places[:, None] + halves).reshape(-1, 3)
         places = places[(places * side < n_blocks).all(axis=1)]
 
 
 def blocks_that_fit(store: str | PathLike[str] | None) -> int:
-    """Count the blocks that fit in memory, or on the disk of a store."""
+    """Return the number of blocks that fit in memory, or on the disk of a store."""
     if store is not None:
         refuse_deleted_folder(store)
         folder = Path(store).absolute()
@@ -265,7 +282,7 @@ def refuse_plane_grid(grid: Grid) -> None:
 
 
 def prepared(solid: Evaluated) -> tuple[FaceTree, Windings]:
-    """Return the search tree and windings of a solid, with caches filled so that threads do not fill them twice."""
+    """Return the search tree and windings of a solid, with their caches filled, so that threads need not fill them."""
     tree, windings = solid.tree, solid.windings
     _ = tree.discs
     windings.inside(np.zeros((1, 3)))
@@ -306,7 +323,10 @@ def in_store(
     scheduler: Scheduler,
     progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float16], TilesComputed]:
-    """Compute the unfinished tiles in files of a folder; return values and confidence, memory-mapped, and a note."""
+    """Compute the unfinished tiles of a band in files of a folder.
+
+    Return (n, 8, 8, 8) values and confidence of its blocks, memory-mapped, and a note.
+    """
     folder = folder.absolute()
     plan: dict[str, NDArray[Any]] = {
         "corners": tree.features.vertices[tree.features.faces],
@@ -331,7 +351,10 @@ def in_store(
 
 
 def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int, n_tiles: int) -> None:
-    """Create the files of a folder, unless it has them; raise an error if they are of another band."""
+    """Create the files of a band in a folder, unless it has them; raise an error if they are of another band.
+
+    `key` identifies the band, and `plan` is the input of its tiles.
+    """
     name = folder / "key.txt"
     if name.exists():
         if name.read_text() != key:
@@ -358,7 +381,7 @@ def _begin(folder: Path, key: str, plan: dict[str, NDArray[Any]], n_blocks: int,
 
 
 def _reserve(path: Path, dtype: type, shape: tuple[int, ...]) -> None:
-    """Make a file of zeros with allocated space, since writing to a mapped page without space kills the process."""
+    """Make a ``.npy`` file of zeros whose space on disk is allocated, since a mapped page without space is fatal."""
     open_memmap(path, mode="w+", dtype=dtype, shape=shape).flush()
     size = path.stat().st_size
     with open(path, "r+b") as file:
@@ -379,7 +402,7 @@ def blocks_held(folder: Path) -> int:
 
 @lru_cache(maxsize=1)
 def _plan(folder: str, key: str) -> tuple[FaceTree, Windings, Grid, dict[str, Ints]]:
-    """Return the input of the tiles of a folder, read once per process."""
+    """Return the search tree, winding numbers, grid and arrays from the plan of a folder, read once per process."""
     with np.load(Path(folder) / "plan.npz", allow_pickle=False) as file:
         plan = dict(file)
     tree = FaceTree.of_triangles(plan["corners"], plan["trusted"], plan["bounding"])
@@ -423,7 +446,7 @@ def _computed(folder: str, key: str, missing: list[int], scheduler: Scheduler) -
 
 
 def _finished(jobs: list[Future[int]], as_they_end: Iterable[Future[int]], folder: str) -> Iterator[int]:
-    """Yield results of jobs, which `as_they_end` iterates over; cancel the others if one fails or the caller stops."""
+    """Yield the results of jobs as they end; cancel the others if one fails or the caller stops."""
     try:
         for job in as_they_end:
             yield job.result()

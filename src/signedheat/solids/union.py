@@ -1,8 +1,8 @@
 """Unite the triangles that close a solid, or combine two solids: cut faces where they cross, keep those that bound.
 
 Where w is 1 inside a solid and 0 outside, ``w(a) − w(b)`` is 1 in a without b and at most 0 elsewhere, and
-``w(a) + w(b) − 1`` is 1 in both only. So each combination is bounded by those triangles of both, turned if
-subtracted, across which such a sum passes ½; a box around both, turned inside out, contributes the − 1.
+``w(a) + w(b) − 1`` is 1 in both only. So each combination is bounded by those triangles of both, reversed if
+subtracted, across which such a sum passes ½. A box around both that faces inwards contributes the − 1.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ the same connected surface."""
 
 @dataclass(frozen=True, eq=False)
 class TriangleGroup:
-    """Triangles of one kind, which all count in the winding number, or all do not."""
+    """Triangles that all count in the winding number, or that all do not."""
 
     triangles: Floats  # (m, 3, 3) corners
     ids: Ints  # (m, 3) vertices, one number for each position
@@ -48,7 +48,7 @@ class TriangleGroup:
 
     @classmethod
     def made(cls, triangles: Floats, closing: bool = True) -> TriangleGroup:
-        """Return the group of triangles that were not given; their vertices have negative numbers."""
+        """Make a group of (m, 3, 3) triangles that were added; their vertices have negative numbers."""
         ids = -1 - same_positions(triangles.reshape(-1, 3)).reshape(-1, 3)
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
@@ -74,7 +74,11 @@ def solid_as_given(mesh: TriangleMesh) -> Solid | None:
 def united(
     surfaces: list[TriangleGroup], keep_overlaps: bool, notes: Sequence[Note] = (), points: Floats | None = None
 ) -> Solid:
-    """Make the solid that surfaces close; confidence falls with the distance from (n, 3) `points`, or given corners."""
+    """Make a solid of groups of triangles: cut them where they cross, and keep those that bound it, and sheets.
+
+    With `keep_overlaps`, given faces inside the solid are kept, too. Confidence in added faces falls with their
+    distance from (n, 3) `points`, or else from the corners of given faces.
+    """
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
@@ -106,14 +110,14 @@ def united(
 
 
 def _windings_of(triangles: Floats, given: Windings) -> Windings:
-    """Return the winding numbers of what bounds the inside; the given ones if it is not the same solid."""
+    """Return the winding numbers of (m, 3, 3) triangles, or `given` if the triangles do not bound its solid."""
     if np.array_equal(triangles, given.triangles) or not same_solid(triangles, given):
         return given
     return Windings(triangles)
 
 
 def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:
-    """Return points, and faces between the first point at each position."""
+    """Return (n, 3) points, and the (m, 3) faces of a group on the first point at each position."""
     points = whole.triangles.reshape(-1, 3)[first_members(whole.ids.ravel(), int(whole.ids.max()) + 1)]
     return points, same_positions(points)[whole.ids]
 
@@ -122,15 +126,15 @@ def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrange
     """Divide faces where they meet: closing faces where they meet each other, all others where they meet these."""
     pairs = overlapping_faces(points, faces, slacks, closing)
     both = closing[pairs].all(axis=1)
-    closed = np.flatnonzero(closing)
+    closing_ids = np.flatnonzero(closing)
     number = np.cumsum(closing) - 1
-    pieces = _arranged(points, faces, closed, number[pairs[both]], slacks)
+    pieces = _arranged(points, faces, closing_ids, number[pairs[both]], slacks)
     if closing.all():
         return pieces
     across = pairs[~both]
-    asked = ~closing
-    asked[across] = True
-    used = np.flatnonzero(asked)
+    relevant = ~closing
+    relevant[across] = True
+    used = np.flatnonzero(relevant)
     number = np.full(len(faces), -1)
     number[used] = np.arange(len(used))
     others = _arranged(points, faces, used, number[across], slacks)
@@ -144,7 +148,7 @@ def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrange
 
 
 def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints, slacks: Floats) -> Arrangement:
-    """Return some faces, divided where pairs of them meet."""
+    """Return the (k,) `chosen` faces, divided where (p, 2) pairs of them meet; pairs are indices into `chosen`."""
     if not len(pairs):
         return Arrangement(points, faces[chosen], chosen, np.arange(len(chosen)))
     pieces = arranged(points, faces[chosen], pairs, slacks[chosen])
@@ -152,7 +156,10 @@ def _arranged(points: Floats, faces: Ints, chosen: Ints, pairs: Ints, slacks: Fl
 
 
 def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds: Bools) -> list[Note]:
-    """Return notes on what was left out (`buried`), what was completed, and how much bounds nothing."""
+    """Return notes: how much was left out (`buried`), how much was completed, and how much bounds nothing.
+
+    All arrays are (m,) for the triangles; `origins` are their given faces or −1.
+    """
     notes: list[Note] = []
     areas, given = face_areas(triangles), origins >= 0
     total = max(float(areas[given].sum()), np.finfo(float).tiny)
@@ -169,7 +176,11 @@ def _notes(triangles: Floats, origins: Ints, kept: Bools, buried: Bools, bounds:
 
 
 def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: Floats | None) -> NDArray[np.float32]:
-    """(m,) confidence in parts of triangles: 1 for given ones, and less for others, the farther they are from those."""
+    """(m,) confidence in triangles: 1 for given ones, and less for added ones, the farther they are from `points`.
+
+    `owners` are the (m,) triangles of `whole` that they are parts of. If `points` is None, distance is measured from
+    the corners of given triangles.
+    """
     confidence, given = np.ones(len(triangles), dtype=np.float32), whole.origins >= 0
     made = np.flatnonzero(~given[owners])
     corners = whole.triangles[given].reshape(-1, 3) if points is None else points
@@ -193,7 +204,10 @@ def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: F
 
 
 def joined_surfaces(surfaces: list[TriangleGroup]) -> TriangleGroup:
-    """Join surfaces; given vertices with one number become one, new ones, with negative numbers, stay apart."""
+    """Join groups of triangles into one whose vertices are numbered anew.
+
+    Vertices with the same number are one vertex, but negative numbers, of added triangles, count only within a group.
+    """
     ids, lowest = [], 0
     for surface in surfaces:
         own = np.where(surface.ids < 0, surface.ids + lowest, surface.ids)
@@ -214,12 +228,12 @@ BOX_SIDES = np.array([[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0
 
 def union(a: Solid, b: Solid) -> Solid:
     """Return the union of two solids."""
-    return _combination(a, b, turned=False)
+    return _combination(a, b, subtracted=False)
 
 
 def difference(a: Solid, b: Solid) -> Solid:
     """Return the part of the first solid outside the second."""
-    return _combination(a, b, turned=True)
+    return _combination(a, b, subtracted=True)
 
 
 def intersection(a: Solid, b: Solid) -> Solid:
@@ -229,7 +243,7 @@ def intersection(a: Solid, b: Solid) -> Solid:
     lower, upper = bounds[0] - room, bounds[1] + room
     corners = np.where(np.array(list(np.ndindex(2, 2, 2))) > 0, upper, lower)
     inwards = np.concatenate([BOX_SIDES[:, [0, 2, 1]], BOX_SIDES[:, [0, 3, 2]]])
-    return _combination(a, b, turned=False, around=corners[inwards])
+    return _combination(a, b, subtracted=False, around=corners[inwards])
 
 
 def halves(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
@@ -256,10 +270,13 @@ def halves(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
     return replace(front, source=solid.source), replace(back, source=solid.source)
 
 
-def _combination(a: Solid, b: Solid, turned: bool, around: Floats | None = None) -> Solid:
-    """Make the solid whose winding number is that of `a`, plus that of `b`, turned or not, plus that of `around`."""
+def _combination(a: Solid, b: Solid, subtracted: bool, around: Floats | None = None) -> Solid:
+    """Make the solid whose winding number is that of `a`, plus or minus that of `b`, plus that of `around`.
+
+    `around` are (k, 3, 3) triangles or None.
+    """
     (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
-    triangles = np.concatenate([first, second[:, ::-1] if turned else second])
+    triangles = np.concatenate([first, second[:, ::-1] if subtracted else second])
     if not len(triangles):
         raise SourceError("neither shape encloses anything", remedy="combine solids, not sheets", element="solid")
     chain = triangles if around is None else np.concatenate([triangles, around])

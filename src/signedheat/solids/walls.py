@@ -16,12 +16,12 @@ from .rims import ALONG_EDGE, corners_of, opposite_edges
 
 NARROW = 0.3
 """A strip at right angles to the surface closes two rims if its area, relative to that of flat lids on both, is at most
-this; one that continues the surface straight on closes them if its area is less than that of the lids. A bowl of half
-a ball whose wall is a quarter of its radius has 0.28, a box without its lid, a tenth as thick as it is wide, 0.32, two
-square sheets a quarter of their width apart 0.5."""
+this. A strip that continues the surface straight on closes them if its area is less than that of the lids. A bowl of
+half a ball whose wall is a quarter of its radius has 0.28, a box without its lid, a tenth as thick as it is wide, 0.32,
+two square sheets a quarter of their width apart 0.5."""
 LARGE_OPENING = 0.1
-"""Two rims are the end of a wall if the area of those lids exceeds this share of their parts' area. Otherwise each rim
-is closed by itself: holes two fifths as wide as a hollow ball have 0.04, a cup 0.2, a bowl 0.5."""
+"""Two rims are the end of a wall if the area of flat lids on both exceeds this share of their parts' area. Otherwise
+each rim is closed by itself: holes two fifths as wide as a hollow ball have 0.04, a cup 0.2, a bowl 0.5."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +48,16 @@ class Rim:
         centre = corners.mean(axis=0)
         radius = float(np.linalg.norm(corners - centre, axis=1).max())
         opening, rim = area_vector(corners), SmoothRim.of(corners)
-        smooth, beside = rim.points, rim.edges_at(0.5 * (rim.places[1:] + rim.places[:-1]))
+        smooth, beside = rim.points, rim.edges_at(0.5 * (rim.shares[1:] + rim.shares[:-1]))
         reach = NARROW * 2.0 * float(np.linalg.norm(opening)) / max(float(side_lengths(smooth).sum()), 1e-300)
         return cls(ids, corners, unit(away), parts, centre, radius, opening, smooth, beside, reach)
 
 
 def seams(rims: list[Rim]) -> list[Ints]:
-    """Return strips between whole sides of rims that run along each other across gaps, each as (k, 3) triangles."""
+    """Return strips of triangles between rims that run along each other across gaps, each (k, 3) vertices.
+
+    A strip joins whole sides, which are the straight parts of a rim between its corners.
+    """
     if not rims:
         return []
     corners = [corners_of(rim.corners) for rim in rims]
@@ -94,19 +97,25 @@ def seams(rims: list[Rim]) -> list[Ints]:
         if whole[0] != whole[1]:
             continue
         used[np.concatenate(runs)] = True
-        places = [_places(rims[owners[run[0]]], corners[owners[run[0]]], run - first[owners[run[0]]]) for run in runs]
-        chosen = [rims[owners[run[0]]] for run in runs]
+        along = [
+            _along_sides(rims[owners[run[0]]], corners[owners[run[0]]], run - first[owners[run[0]]]) for run in runs
+        ]
+        pair = [rims[owners[run[0]]] for run in runs]
         if whole[0]:
-            strips.append(strip(chosen[0], chosen[1]))
+            strips.append(strip(pair[0], pair[1]))
             continue
-        points = [rim.corners[ids_around] for rim, ids_around in zip(chosen, places, strict=True)]
-        ids = [rim.ids[ids_around] for rim, ids_around in zip(chosen, places, strict=True)]
+        points = [rim.corners[indices] for rim, indices in zip(pair, along, strict=True)]
+        ids = [rim.ids[indices] for rim, indices in zip(pair, along, strict=True)]
         strips.append(_zipped(ids[0], points[0], ids[1][::-1], points[1][::-1]))
     return strips
 
 
 def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> list[Ints]:
-    """Group pairs of meeting sides, given with their reverses, into stretches: (k, 2) arrays, the longest first."""
+    """Group pairs of sides that face each other into stretches, (k, 2) arrays of sides, the longest first.
+
+    Successive sides of one rim that face the same or successive sides of the other are in one stretch. The pairs
+    `first` and `second` are given in both orders; `following` is the next side around the rim, `lengths` that of sides.
+    """
     if not len(first):
         return []
     n = len(following)
@@ -127,7 +136,7 @@ def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> l
 
 
 def _run(sides: Ints, following: Ints) -> Ints:
-    """Return sides in the order in which they follow each other; none if they are not connected."""
+    """Return sides in the order in which they follow each other around their rim; none if they are not connected."""
     begins = sides[~np.isin(sides, following[sides])]
     if len(begins) > 1 or not len(sides):
         return sides[:0]
@@ -141,8 +150,11 @@ def _run(sides: Ints, following: Ints) -> Ints:
     return np.array(run)
 
 
-def _places(rim: Rim, corners: Ints, sides: Ints) -> Ints:
-    """Return the places around a rim of all vertices of some successive sides, including both ends."""
+def _along_sides(rim: Rim, corners: Ints, sides: Ints) -> Ints:
+    """(k,) indices around a rim of all vertices of some successive sides, including both ends.
+
+    `corners` are the indices at which its sides begin.
+    """
     begin, stop = corners[sides[0]], corners[(sides[-1] + 1) % len(corners)]
     count = (stop - begin) % len(rim.ids) or len(rim.ids)
     return (begin + np.arange(count + 1)) % len(rim.ids)
@@ -164,9 +176,9 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
             if lids > LARGE_OPENING * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
                 (area, onward), (again, back) = _strip_areas(larger, smaller), _strip_areas(smaller, larger)
                 straight = (onward + back) / max(area + again, 1e-300)
-                one = len(np.unique(np.concatenate([larger.parts, smaller.parts]))) == 1
+                same_part = len(np.unique(np.concatenate([larger.parts, smaller.parts]))) == 1
                 # rims of one part around each other, as of half a ring, have lids that would fill its hole
-                if area + again <= 2 * lids * (1 + straight if one else NARROW + (1 - NARROW) * straight):
+                if area + again <= 2 * lids * (1 + straight if same_part else NARROW + (1 - NARROW) * straight):
                     widths.append(((area + again) / lids, i, j))
     best: list[tuple[int, int]] = []
     paired: set[int] = set()
@@ -184,38 +196,43 @@ def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
     the part of that way along `Rim.onward`, so it is negative if the strip leads back over the surface.
     """
     along = np.roll(rim.smooth, -1, axis=0) - rim.smooth
-    lengths, places = np.linalg.norm(along, axis=1), other.smooth
-    base = np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)
+    lengths, points = np.linalg.norm(along, axis=1), other.smooth
+    base = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
     steps = np.linalg.norm(base, axis=1)
     base /= np.maximum(steps, 1e-300)[:, None]
     middles = rim.smooth + 0.5 * along
-    nearest = PointTree(places).query(middles)[1]
-    across = places[nearest] - middles
+    nearest = PointTree(points).query(middles)[1]
+    across = points[nearest] - middles
     across -= np.clip((across * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
     onward = (across * rim.onward[rim.beside]).sum(axis=1)
     return float(lengths @ np.linalg.norm(across, axis=1)), float(lengths @ onward)
 
 
-def strip(one: Rim, other: Rim) -> Ints:
-    """(k, 3) vertices of triangles between rims that run opposite ways, from their two nearest corners on."""
-    away, nearest = PointTree(other.corners).query(one.corners)
+def strip(first: Rim, second: Rim) -> Ints:
+    """(k, 3) vertices of triangles that join two rims all around; they run opposite ways."""
+    away, nearest = PointTree(second.corners).query(first.corners)
     start = int(np.argmin(away))
-    i = (start + np.arange(len(one.ids) + 1)) % len(one.ids)
-    j = (nearest[start] - np.arange(len(other.ids) + 1)) % len(other.ids)
-    return _zipped(one.ids[i], one.corners[i], other.ids[j], other.corners[j])
+    i = (start + np.arange(len(first.ids) + 1)) % len(first.ids)
+    j = (nearest[start] - np.arange(len(second.ids) + 1)) % len(second.ids)
+    return _zipped(first.ids[i], first.corners[i], second.ids[j], second.corners[j])
 
 
-def _zipped(one: Ints, points: Floats, other: Ints, across: Floats) -> Ints:
-    """(k, 3) triangles between two chains, along the first and against the other; each takes the shorter diagonal."""
+def _zipped(first_ids: Ints, first_points: Floats, second_ids: Ints, second_points: Floats) -> Ints:
+    """(k, 3) vertices of triangles between two chains of vertices, which use the shorter diagonal each time.
+
+    Each chain has ids and positions. Faces run along the first chain, and against the second.
+    """
     a, b, rows = 0, 0, []
-    while a < len(one) - 1 or b < len(other) - 1:
-        if b == len(other) - 1 or (
-            a < len(one) - 1 and np.linalg.norm(points[a + 1] - across[b]) <= np.linalg.norm(points[a] - across[b + 1])
+    while a < len(first_ids) - 1 or b < len(second_ids) - 1:
+        if b == len(second_ids) - 1 or (
+            a < len(first_ids) - 1
+            and np.linalg.norm(first_points[a + 1] - second_points[b])
+            <= np.linalg.norm(first_points[a] - second_points[b + 1])
         ):
-            rows.append((one[a], one[a + 1], other[b]))
+            rows.append((first_ids[a], first_ids[a + 1], second_ids[b]))
             a += 1
         else:
-            rows.append((one[a], other[b + 1], other[b]))
+            rows.append((first_ids[a], second_ids[b + 1], second_ids[b]))
             b += 1
     faces = np.array(rows)
     return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])

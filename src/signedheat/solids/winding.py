@@ -19,16 +19,16 @@ INSIDE_WINDING = 0.5
 CLEAR_COSINE = 1e-3
 """Cosine between a normal and the direction from the surface above which its sign is the side of a point."""
 ON_SURFACE = 1e-12
-"""Distance up to which a point is on the surface, relative to its own largest coordinate."""
+"""A point is on the surface up to this distance, relative to its own largest coordinate. Its side is not computed."""
 SUMMED_POINTS = 16
-"""At this many points or fewer, sums over all triangles take less time and memory than a tree."""
+"""For this many points or fewer, sums over all triangles take less time and memory than a tree."""
 
 
 @dataclass(frozen=True, eq=False)
 class Windings(Frozen):
     """Winding numbers of triangles with balanced edges: integers, which change only across the triangles."""
 
-    triangles: Floats  # (m, 3, 3) corners; equal places have equal numbers
+    triangles: Floats  # (m, 3, 3) corners
 
     def __post_init__(self) -> None:
         ends = open_edges_of(self.triangles)
@@ -47,21 +47,21 @@ class Windings(Frozen):
         return WindingTree.of(self.triangles)
 
     def numbers(self, points: Floats) -> Floats:
-        """(n,) winding numbers of points."""
+        """(n,) winding numbers of (n, 3) points."""
         return self.tree.numbers(points) if len(self.triangles) and len(points) else np.zeros(len(points))
 
     def numbers_once(self, points: Floats) -> Floats:
-        """(n,) winding numbers, summed without a tree if the points are few: for callers that ask only once."""
+        """(n,) winding numbers of (n, 3) points, without making the tree if they are few; for single calls."""
         return winding_sums(self.triangles, points) if len(points) <= SUMMED_POINTS else self.numbers(points)
 
     def inside(self, points: Floats) -> Bools:
-        """(n,) whether points are inside."""
+        """(n,) whether (n, 3) points are inside."""
         return self.numbers(points) > INSIDE_WINDING
 
     def inside_near(self, points: Floats, nearest: NearestFaces) -> Bools:
-        """(n,) whether points are inside, by the normals at their nearest places where these decide.
+        """(n,) whether (n, 3) points are inside: by the normal at the nearest point, or by winding numbers if unclear.
 
-        On the surface either side is right, and rounding may choose it.
+        Points on the surface count as either, depending on rounding.
         """
         inside: Bools = nearest.cosines < 0
         on_surface = nearest.distances < ON_SURFACE * np.abs(points).max(axis=1, initial=0.0)
@@ -71,13 +71,13 @@ class Windings(Frozen):
         return inside
 
     def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
-        """(n,) whether places just behind (n, 3, 3) triangles are inside; and the same just in front of them."""
+        """(n,) whether points just behind (n, 3, 3) triangles are inside, and (n,) the same just in front of them."""
         step, centres = steps_off(triangles, OFF_FACE), triangles.mean(axis=1)
         return self.inside(centres - step), self.inside(centres + step)
 
 
 def open_edges_of(triangles: Floats) -> Floats:
-    """(n, 2, 3) ends of unbalanced edges."""
+    """(n, 2, 3) ends of edges of (m, 3, 3) triangles at which opposite directions do not balance."""
     corners = triangles.reshape(-1, 3)
     faces = same_positions(corners).reshape(-1, 3)
     a, b, c = faces.T
