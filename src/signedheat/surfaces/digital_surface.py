@@ -51,9 +51,8 @@ class DigitalSurface(Displayed, Surface):
         Position of the centre of voxel ``(0, 0, 0)``.
     radius : float, optional
         Radius, in units of length, of the neighbourhood over which normals are estimated; with 0 every face has its own
-        normal. Small radii keep details, large ones remove the staircase. By default 0.4 times the square root of voxel
-        size times diameter of the shape: under refinement it shrinks, but contains ever more voxels, which convergence
-        requires.
+        normal. Small radii keep details, large ones remove the staircase. By default 0.4 · √(voxel size · extent of the
+        shape). Under refinement this shrinks, but contains more and more voxels, as convergence requires.
 
     Raises
     ------
@@ -150,22 +149,22 @@ class DigitalSurface(Displayed, Surface):
 
     @cached_property
     def smooth_vertices(self) -> Floats:
-        """(n, 3) the vertices moved so that faces are nearly orthogonal to `normals`: what distance is measured on."""
+        """(n, 3) vertices, moved so that faces are nearly orthogonal to `normals`; distance is measured on these."""
         return frozen(smoothed_corners(self.vertices, self.surfels.corners, self.normals))
 
     @cached_property
     def smooth_surface(self) -> TriangleMesh:
-        """A smooth surface between the centres of the voxels inside and those outside: closed, manifold, outward.
+        """A smooth surface between the centres of the voxels inside and outside: closed, manifold, facing outwards.
 
-        It stays within half a voxel, along each axis, of the corners of voxels, and separates the same voxels: signed
-        distance to it is negative at the centres of those inside, and at no others.
+        Along each axis, it stays within half a voxel of the corners of voxels. Signed distance to it is negative at the
+        centres of voxels inside, and positive at those of all others.
         """
         vertices, faces = surface_net(self.volume)
         return TriangleMesh(self.origin + vertices * self.spacing, faces)
 
     @property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to: four per face, in the order of its sides, around a virtual vertex."""
+        """The triangles that curves refer to: four per face, in the order of its sides, around an added vertex."""
         return self.squares.triangulation
 
     def on_triangulation(self, values: Floats) -> Floats:
@@ -185,21 +184,20 @@ class DigitalSurface(Displayed, Surface):
 
 
 STAYING = 0.003
-"""Weight of staying in the middle of a cell: stairs some four voxels long become slopes. Mean error of normals of a
-ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at 0.01 1.8° to 2.1°, at 0.001 0.8° to 1.3°; of a box along
-the axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
+"""Weight that keeps vertices near the middle of their cells. With it, stairs some four voxels long become slopes. Mean
+error of normals of a ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at 0.01 1.8° to 2.1°, at 0.001 0.8° to
+1.3°; of a box along the axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
 LARGEST_MOVE = 0.49
-"""Largest move of a vertex along each axis, in voxels: below a half, so that no two coincide, in single precision
-either."""
+"""Largest move of a vertex along each axis, in voxels. Below a half, no two coincide, even in single precision."""
 
 
 def surface_net(volume: Bools) -> tuple[Floats, Ints]:
-    """Make a smooth closed surface between voxels inside and outside; return vertices, in voxels, and triangles."""
+    """Make a smooth closed surface between voxels inside and outside: (n, 3) vertices, in voxels, and (m, 3) faces."""
     padded = np.pad(volume, 2)
     crossings = crossings_in(np.where(padded, -1.0, 1.0), np.zeros(3, dtype=np.int64))
     around = crossed_cells(crossings, padded.shape)
     cells = dual_cells(crossings, around, padded.shape, lambda places: np.ones(len(places), dtype=bool))
-    middles, room = _rooms(cells, crossings)
+    middles, room = _middles(cells, crossings)
     relaxed = _relaxed(cells.quads, middles, room)
     rows, along = np.arange(len(crossings.axes)), crossings.axes
     shares = relaxed[cells.quads, along[:, None]].mean(axis=1) - crossings.nodes[rows, along]
@@ -209,8 +207,11 @@ def surface_net(volume: Bools) -> tuple[Floats, Ints]:
     return vertices - 2, faces
 
 
-def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
-    """(v, 3) middle of each piece of surface in a cell; (v, 1) largest move of its vertex, 0 if the cell has others."""
+def _middles(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
+    """(v, 3) middles of pieces of the surface in cells, and (v, 1) largest moves of their vertices.
+
+    A piece that shares its cell with others must not move.
+    """
     count = len(cells.owners)
     crossed = crossings.nodes + 0.5 * np.eye(3)[crossings.axes]
     degrees = np.bincount(cells.quads.ravel(), minlength=count)
@@ -221,7 +222,10 @@ def _rooms(cells: DualCells, crossings: Crossings) -> tuple[Floats, Floats]:
 
 
 def _relaxed(quads: NDArray[np.int32], middles: Floats, room: Floats) -> Floats:
-    """(v, 3) places where a net bends least, by accelerated gradients with restarts (O'Donoghue & Candès 2015)."""
+    """(v, 3) vertices at which a net of quads bends least, at most `room` from their middles along each axis.
+
+    They are found by accelerated gradient descent with restarts (O'Donoghue & Candès 2015).
+    """
     count = len(middles)
     tails, heads = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
     links = sparse.coo_array((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
@@ -229,31 +233,32 @@ def _relaxed(quads: NDArray[np.int32], middles: Floats, room: Floats) -> Floats:
     links.data[:] = 1
     weights = 1 / links.sum(axis=1)
     bending = sparse.csr_array(sparse.eye_array(count) - sparse.diags_array(weights) @ links)
-    back = bending.T.tocsr()
-    places, ahead, pace = middles, middles, 1.0
+    transposed = bending.T.tocsr()
+    positions, extrapolated, momentum = middles, middles, 1.0
     for _ in range(200):  # the slowest modes that `STAYING` allows need about 4 / √STAYING = 73 steps
-        slope = back @ (bending @ ahead) + STAYING * (ahead - middles)
+        slope = transposed @ (bending @ extrapolated) + STAYING * (extrapolated - middles)
         # every bending mode decays with a step below 2 / (2² + `STAYING`)
-        new = np.clip(ahead - 0.24 * slope, middles - room, middles + room)
-        returning = ((ahead - new) * (new - places)).sum() > 0
-        faster = 1.0 if returning else 0.5 * (1 + np.sqrt(1 + 4 * pace**2))
-        ahead = new + (0.0 if returning else (pace - 1) / faster) * (new - places)
-        moved = float(np.abs(new - places).max())
-        places, pace = new, faster
+        new = np.clip(extrapolated - 0.24 * slope, middles - room, middles + room)
+        restart = ((extrapolated - new) * (new - positions)).sum() > 0
+        next_momentum = 1.0 if restart else 0.5 * (1 + np.sqrt(1 + 4 * momentum**2))
+        extrapolated = new + (0.0 if restart else (momentum - 1) / next_momentum) * (new - positions)
+        moved = float(np.abs(new - positions).max())
+        positions, momentum = new, next_momentum
         if moved < 1e-4:  # voxels
             break
-    return places
+    return positions
 
 
 ATTACHMENT = 0.1
-"""Weight of staying in place: corners move by averages over 1/√0.1, about 3 voxels, as staircases need."""
+"""Weight that keeps corners near their positions: they move by averages over 1/√0.1, about 3 voxels, as staircases
+need."""
 
 
 def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats:
-    """(n, 3) corners p, moved so that squares f with sides ij are nearly orthogonal to their normals n_f.
+    """(n, 3) vertices p, moved from v so that squares f with sides ij are nearly orthogonal to their normals n_f.
 
-    They minimise ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``, after Coeurjolly, Lachaud & Gueth, *Digital
-    surface regularization with guarantees*, 2021.
+    `corners` are (m, 4), `normals` (m, 3). The result minimises ``Σ (n_f · (p_j − p_i))² + ATTACHMENT Σ |p_i − v_i|²``
+    (Coeurjolly, Lachaud & Gueth, *Digital surface regularization with guarantees*, 2021).
     """
     m, n = len(corners), len(vertices)
     row, tails, heads = np.arange(4 * m), corners.ravel(), np.roll(corners, -1, axis=1).ravel()
@@ -271,7 +276,7 @@ def smoothed_corners(vertices: Floats, corners: Ints, normals: Floats) -> Floats
 
 
 STEEPEST_NORMAL = 0.05
-"""Least cosine of the angle between a corrected normal and the square's own."""
+"""Least cosine between a corrected normal and the square's own, before normals are scaled to length 1."""
 WIDEST_BLUR, NARROWEST_BLUR = 1e3, 1e-3
 """Largest radius of a blur, in extents of the volume, and least width, in voxels: beyond these no normal changes."""
 
@@ -288,12 +293,12 @@ class Surfels:
 
     @property
     def outward(self) -> Ints:
-        """(m, 3) normals, which are steps to the voxels outside."""
+        """(m, 3) outward unit normals, which are also the steps from voxels inside to those outside."""
         return np.eye(3, dtype=np.int64)[self.axes] * self.signs[:, None]
 
 
 def boundary_surfels(volume: Bools) -> Surfels:
-    """Surfels of a volume, in order of their voxels; everything beyond the array is outside."""
+    """Return the boundary squares of a volume, in order of their voxels; all beyond the array is outside."""
     parts, ways = [], [(axis, sign) for axis in range(3) for sign in (-1, 1)]
     for axis, sign in ways:
         beyond = np.zeros_like(volume)
@@ -320,12 +325,15 @@ def boundary_surfels(volume: Bools) -> Surfels:
 
 
 def count_surfels(volume: Bools) -> int:
-    """Count the boundary squares of a set of voxels."""
+    """Return the number of boundary squares of a set of voxels."""
     return sum(int(np.diff(volume, axis=axis, prepend=False, append=False).sum()) for axis in range(3))
 
 
 def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: float) -> Floats:
-    """(m, 3) unit normals: the negative gradient of the volume after a blur of standard deviation radius/2."""
+    """(m, 3) unit normals of surfels: the negative gradient of the volume after a blur of standard deviation radius/2.
+
+    Those too far from the surfel's own normal are tilted towards it.
+    """
     own = surfels.outward.astype(np.float64)
     if radius == 0:
         return own
@@ -348,7 +356,10 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
 
 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
-    """Replace each edge along which two voxels touch by two, each of surfels that face the same voxel outside."""
+    """Replace each edge along which two voxels touch by two, one for the surfels that face each voxel outside.
+
+    Triangles are four per surfel; the first side of each is that of the surfel.
+    """
     triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
     surfel = triangles // 4
     outside = (surfels.voxels + surfels.outward)[surfel]

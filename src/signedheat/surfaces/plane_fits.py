@@ -17,25 +17,27 @@ POINT_NEIGHBORS = 8
 CLEAN_NEIGHBORS = 12
 """Number of neighbours to which a plane is fitted where there is no noise."""
 NOISY_NEIGHBORS = (12, 24, 48, 96, 192)
-"""Sizes of neighbourhood for noisy points."""
+"""Numbers of neighbours that planes of noisy points may be fitted to."""
 CLEAN_DEVIATION = 0.07
-"""Deviation from robust planes, in reaches of neighbourhoods, above which points are noisy: curvature stays below 0.06,
-also on thin sheets and at edges that the points resolve; noise as wide as the neighbourhood has 0.09 or more."""
+"""Points are noisy if they deviate from robust planes by more than this, relative to the reach of neighbourhoods.
+Curvature stays below 0.06, also on thin sheets and at edges that the points resolve; noise as wide as the neighbourhood
+has 0.09 or more."""
 ANGLE_ERROR = 0.13
-"""Largest angle, in radians, by which noise may turn planes, as estimated from their deviation."""
+"""Neighbourhoods are large enough if noise tilts planes by less than this angle, in radians, estimated from their
+deviation."""
 CLEAN_HEIGHTS = (0.25, 0.15, 0.1)
-"""Heights over the plane through a point, in reaches, beyond which neighbours are left out, in successive fits."""
+"""In successive fits, neighbours are left out if they are higher over the plane than this, relative to the reach."""
 NOISY_HEIGHTS = (0.5, 0.5, 0.5)
-"""The same over planes that move from a noisy point to where its neighbours are densest."""
+"""The same for noisy points, over planes that move from a point to where its neighbours are densest."""
 TWO_SIDES = 0.9
-"""Mean distance of neighbours from a quadric through them, relative to the root of its mean square, above which they
-are those of two sides: it is 0.88 to 0.99 for two sides with even points, 0.83 to 0.96 with random ones, but 0.74 to
-0.86 for one noisy side."""
+"""Neighbours lie on two sides if their mean distance from a fitted quadric, relative to the root mean square, exceeds
+this. It is 0.88 to 0.99 for two sides with even points, 0.83 to 0.96 with random ones, but 0.74 to 0.86 for one noisy
+side."""
 MERGED_SHARE = 0.03
-"""Share of points with neighbours on two sides above which there is a warning. Of scans, CAD and tori with up to 0.4
-spacings of noise at most 0.014 are such; of plates, bowls, lenses and tubes whose sides are merged 0.25 to 1."""
+"""If a larger share of the points has neighbours on two sides, there is a warning. Of scans, CAD and tori with up to
+0.4 spacings of noise at most 0.014 are such; of plates, bowls, lenses and tubes whose sides are merged 0.25 to 1."""
 ONE_SIDE = 0.02
-"""Root mean square distance from a quadric, in spacings, up to which neighbours are taken for those of one side."""
+"""Neighbours lie on one side if their root mean square distance from a quadric is at most this, in spacings."""
 STARTS = 5
 """Number of planes from which the fit to points on a surface starts, since it ends at the nearest of several sheets."""
 TRIED_POINTS = 2000
@@ -44,17 +46,21 @@ TRIED_POINTS = 2000
 
 @dataclass(frozen=True, eq=False)
 class PlaneFits:
-    """Planes fitted near points."""
+    """Planes fitted near n points."""
 
     axes: Floats  # (n, 3) unit normals, up to sign
-    places: Floats  # (n, 3) the points themselves; where they are noisy, the nearest points of the planes
+    places: Floats  # (n, 3) the points themselves; if they are noisy, their projections onto the planes
     reaches: Floats  # (n,) distance to the last neighbour used
-    n_neighbors: int  # size of the neighbourhoods
+    n_neighbors: int  # number of neighbours that each plane was fitted to
     noisy: bool  # whether the points lie around the surface rather than on it
 
 
 def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
-    """Fit a plane near each of (n, 3) distinct points: to `n_neighbors` of noisy ones, or, if that is None, to few."""
+    """Fit a plane near each of (n, 3) distinct points.
+
+    Points are noisy if `n_neighbors` is given, and planes are fitted to this number of neighbours. Otherwise points lie
+    on the surface, and planes are fitted to few.
+    """
     tree = PointTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
@@ -65,7 +71,10 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
 
 
 def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
-    """List the sizes of neighbourhoods, ascending, that allow planes to be fitted despite noise; none without noise."""
+    """List numbers of neighbours, ascending, that allow planes to be fitted to (n, 3) noisy points; none without noise.
+
+    `normals`, (n, 3) if given, keep points of different sides apart.
+    """
     largest = (len(points) - 1) // 4
     if largest < CLEAN_NEIGHBORS:
         return []
@@ -86,28 +95,32 @@ def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
 
 
 def noise_scale(points: Floats, normals: Floats | None = None) -> int | None:
-    """Choose the size of neighbourhoods for noisy points, whose normals may be given; None without noise."""
+    """Return the number of neighbours to which planes of (n, 3) noisy points should be fitted; None without noise."""
     sizes = noisy_sizes(points, normals)
     return sizes[min(2, len(sizes) - 1)] if sizes else None
 
 
 def areas_per_point(distances: Floats, k: int, dimension: int = 2) -> Floats:
-    """Estimate areas, or sizes of that dimension, of points: the ball up to the k-th neighbour has k of them."""
+    """(n,) area per point, from the distances to the k-th neighbours; the length or volume for other dimensions."""
     unit_ball = pi ** (dimension / 2) / gamma(dimension / 2 + 1)
     return np.asarray(unit_ball * distances**dimension / k)
 
 
 def point_spacing(distances: Floats, k: int) -> Floats:
-    """Estimate the spacing of points on a surface from the distance to the k-th neighbour."""
+    """(n,) spacing of points on a surface, estimated from the (n,) distances to their k-th neighbours."""
     return np.sqrt(areas_per_point(distances, k))
 
 
 def share_of_two_sides(points: Floats, normals: Floats) -> float:
-    """Share of points whose neighbours lie at two heights over a quadric, as on plates thinner than the spacing."""
+    """Return the share of points whose neighbours lie on two sides of a quadric, as on plates thinner than the spacing.
+
+    Points and their unit normals are (n, 3); at most about `TRIED_POINTS` are examined.
+    """
     k = min(2 * CLEAN_NEIGHBORS, len(points) - 1)  # a quadric has twice as many coefficients as a plane
     tree = PointTree(points)
 
     def two_sided(tried: Ints) -> tuple[Bools]:
+        """(k,) whether the neighbours of points lie on two sides."""
         distances, near = tree.query(points[tried], k=k + 1)
         offsets, normal = points[near] - points[tried, None], normals[tried]
         weights = np.exp(-((distances / distances[:, -1:]) ** 2)) * (np.einsum("nkd,nd->nk", normals[near], normal) > 0)
@@ -134,11 +147,11 @@ def planes_near(
     *,
     on_surface: bool,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Fit planes near `chosen` points (c,) to their neighbours, leaving out those beyond each of `heights` in turn.
+    """Fit planes near (c,) `chosen` points to their neighbours, leaving out those beyond each of `heights` in turn.
 
-    Heights are over the plane through the point, if `on_surface`, else over that through the mean of the neighbours.
-    Returns (c, 3) normals, (c, 3) means, (c,) reaches (distances to the last neighbour), and (c,) root mean square
-    heights, in reaches as `heights` are.
+    Heights are relative to the reach, the distance to the last neighbour. They are over the plane through the point, if
+    `on_surface`, or else over that through the mean of the neighbours. Return (c, 3) normals, (c, 3) means, (c,)
+    reaches, and (c,) root mean square heights.
     """
 
     def fit(ids: Ints) -> tuple[Floats, Floats, Floats, Floats]:
@@ -155,7 +168,7 @@ def planes_near(
 
 @compiled
 def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, axis: Floats) -> float:
-    """Write the unit eigenvector of the least eigenvalue of a symmetric 3×3 matrix; return the value (Smith 1961)."""
+    """Return the least eigenvalue of a symmetric 3×3 matrix (Smith 1961), and write its unit eigenvector to `axis`."""
     mean = (xx + yy + zz) / 3.0
     ax, ay, az = xx - mean, yy - mean, zz - mean
     p = ((ax * ax + ay * ay + az * az + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0) ** 0.5
@@ -197,7 +210,10 @@ def least_eigenvector(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
 
 @compiled
 def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, center: Floats) -> float:
-    """Fit a plane to the first `count` points; write its normal and their mean, return their mean squared height."""
+    """Fit a plane to the first `count` of (k, 3) weighted points; return their mean squared height over it.
+
+    Write its unit normal to `axis`, and the weighted mean of the points to `center`.
+    """
     total = x = y = z = 0.0
     for j in range(count):
         total += weights[j]
@@ -217,7 +233,7 @@ def weighted_plane(offsets: Floats, weights: Floats, count: int, axis: Floats, c
 
 @compiled
 def plane_through(a: Floats, b: Floats, axis: Floats) -> bool:
-    """Write the normal of the plane spanned by two vectors; return whether they span one."""
+    """Write the unit normal of the plane spanned by two vectors to `axis`; return whether they span one."""
     u, v, w = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     square = u * u + v * v + w * w
     if square <= 1e-16 * (a[0] ** 2 + a[1] ** 2 + a[2] ** 2) * (b[0] ** 2 + b[1] ** 2 + b[2] ** 2):
@@ -229,7 +245,10 @@ def plane_through(a: Floats, b: Floats, axis: Floats) -> bool:
 
 @compiled
 def weigh_by_height(offsets: Floats, near: Floats, axis: Floats, base: Floats, height: float, weights: Floats) -> float:
-    """Write Tukey's biweight of the heights over a plane through `base`, times `near`; return the sum."""
+    """Write Tukey's biweights of the heights of (k, 3) points over a plane, times (k,) `near`; return their sum.
+
+    The plane goes through `base` across `axis`; at heights of `height` and more, weights are 0.
+    """
     total = 0.0
     level = axis[0] * base[0] + axis[1] * base[1] + axis[2] * base[2]
     for j in range(len(near)):
@@ -251,10 +270,11 @@ def robust_planes(
     centers: Floats,
     deviations: Floats,
 ) -> None:
-    """Fit a plane near each point, listed first among its neighbours, to those within each of `heights` in turn.
+    """Fit a plane near each point to those of its neighbours within each of `heights` in turn.
 
-    Heights are in reaches, over the plane through the point, if `on_surface`, else through the last centre; of several
-    starts the best is kept.
+    `neighbors` are (n, k) ids, a point itself first, and `distances` (n, k). Heights are relative to the last distance.
+    They are over the plane through the point, if `on_surface`, or else through the last centre. The best of `n_starts`
+    fits is kept: its normal, centre and root mean square height are written to `axes`, `centers` and `deviations`.
     """
     n, k = neighbors.shape
     offsets, near, weights = np.empty((k, 3)), np.empty(k), np.empty(k)
