@@ -49,17 +49,24 @@ def distance_to_zero_line(
 
 
 def distance_to_segments(
-    triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float = 1e-4, report: Report | None = None
+    triangles: IntrinsicMesh,
+    placed: PlacedSegments,
+    tolerance: float = 1e-4,
+    report: Report | None = None,
+    reach: float = np.inf,
 ) -> tuple[Floats, int]:
-    """Return the distance of every vertex to segments and points as `distance_to_zero_line` does."""
+    """Return the distance of every vertex to segments and points as `distance_to_zero_line` does; inf beyond `reach`.
+
+    The work is in proportion to the number of faces within `reach`.
+    """
     limit = window_limit(triangles)
     placed = through_vertices(triangles, placed)
     # a longer search is started anew in Delaunay triangles: the long edges of slivers see every segment of a curve
     many = min(30 * triangles.n_edges + 50_000, limit)
-    search = PausedSearch.start(triangles, placed, tolerance).until(many, report)
+    search = PausedSearch.start(triangles, placed, tolerance, reach).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
     if better is not None:
-        anew = PausedSearch.start(*better, tolerance).until(limit, report)
+        anew = PausedSearch.start(*better, tolerance, reach).until(limit, report)
         search = anew if anew.has_ended else search
     search = search.until(limit, report)
     windows = min(search.windows, limit - 1) if search.has_ended else limit
@@ -103,9 +110,12 @@ class PausedSearch:
     faces: Faces  # the triangles as plain arrays
     search: Search  # the state of the search, which is changed in place
     tolerance: float  # see `distance_to_zero_line`
+    reach: float  # the distance at which the search ends
 
     @classmethod
-    def start(cls, triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float) -> PausedSearch:
+    def start(
+        cls, triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float, reach: float = np.inf
+    ) -> PausedSearch:
         """Start with the waves that leave the sources."""
         sources, pseudosources = placed.sources(triangles), is_pseudosource(triangles)
         pseudosources[sources.vertices] = True
@@ -115,7 +125,7 @@ class PausedSearch:
         search = Search.start(triangles, pseudosources, 1024 + int(beyond.sum()))
         search.distance[sources.vertices] = 0.0
         reach_corners(triangles, sources, search.distance)
-        started = cls(triangles, Faces.of(triangles), search, tolerance)
+        started = cls(triangles, Faces.of(triangles), search, tolerance, reach)
         start_search(started.faces, waves, search, started.slack)
         return started
 
@@ -126,8 +136,8 @@ class PausedSearch:
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing is left to propagate."""
-        return bool(self.search.queue.size[0] == 0)
+        """Whether nothing is left to propagate within reach."""
+        return not is_waiting(self.search.queue, self.reach)
 
     @property
     def windows(self) -> int:
@@ -137,18 +147,20 @@ class PausedSearch:
     def until(self, limit: int, report: Report | None) -> PausedSearch:
         """Continue this search to its end, or until `limit` windows have been made, and return it."""
         search = self.search
-        while search.queue.size[0] > 0 and search.counts[WINDOWS_MADE] < limit:
+        while not self.has_ended and search.counts[WINDOWS_MADE] < limit:
             if report is not None:
                 report()
             if search.counts[MISSING_ROWS]:
                 search.larger().counts[MISSING_ROWS] = 0
             most = min(search.counts[WINDOWS_MADE] + (1 << 16), limit)
-            continue_search(self.faces, search, self.slack, self.tolerance, most)
+            continue_search(self.faces, search, self.slack, self.tolerance, self.reach, most)
         return self
 
     def distance(self) -> Floats:
-        """Return (n,) distances of all vertices; those that the search has not found go along edges."""
+        """Return (n,) distances, inf beyond reach; those within it that the search has not found go along edges."""
         distance = self.search.distance
+        if np.isfinite(self.reach) and self.has_ended:
+            return np.where(distance <= self.reach, distance, np.inf)
         if self.has_ended and np.isfinite(distance).all():
             return distance
         reached = np.flatnonzero(np.isfinite(distance))
@@ -295,10 +307,16 @@ def list_length(following: Ints, row: int) -> int:
 
 
 @compiled
-def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, limit: int) -> None:
-    """Propagate in order of distance until nothing is queued, rows are missing, or `limit` windows have been made."""
+def is_waiting(queue: Queue, reach: float) -> bool:
+    """Return whether something is queued whose distance is at most `reach`."""
+    return bool(queue.size[0] > 0 and queue.keys[queue.items[0]] <= reach)
+
+
+@compiled
+def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, reach: float, limit: int) -> None:
+    """Propagate in order of distance, up to `reach`, until rows are missing or `limit` windows have been made."""
     queue, counts = search.queue, search.counts
-    while queue.size[0] > 0 and counts[WINDOWS_MADE] < limit:
+    while is_waiting(queue, reach) and counts[WINDOWS_MADE] < limit:
         item = queue.items[0]
         is_halfedge, most = item < len(search.queued), search.most[item]
         if is_halfedge:

@@ -115,6 +115,19 @@ class PlacedSegments:
         """(k,) length of each segment."""
         return np.abs(self.positions[:, 1] - self.positions[:, 0])
 
+    def joined(self, more: PlacedSegments) -> PlacedSegments:
+        """Return these segments and more of them, none of whose nodes are shared."""
+        nodes, given = len(self.nodes), int(self.given.max(initial=-1)) + 1
+        return PlacedSegments(
+            concatenated([self.nodes, more.nodes]),
+            np.concatenate([self.ends, more.ends + nodes]),
+            np.concatenate([self.faces, more.faces]),
+            np.concatenate([self.positions, more.positions]),
+            np.concatenate([self.along_edge, more.along_edge]),
+            np.concatenate([self.sides, more.sides]),
+            np.concatenate([self.given, more.given + given]),
+        )
+
     def sources(self, triangles: IntrinsicMesh) -> GeodesicSources:
         """Return the waves that leave the segments, and points at which no segment ends."""
         inside = np.flatnonzero(~self.along_edge)

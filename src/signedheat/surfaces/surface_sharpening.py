@@ -144,23 +144,28 @@ def nearest_curve(
     Curves decide sides in regions that they bound, and next to them; far from them the zero set of φ counts.
     """
     placed = PlacedSegments.of(triangles, parts)
-    distance, windows = distance_to_segments(triangles, placed, tolerance, report)
-    counts = [windows]
     if not any(part.oriented for part in parts):
-        return Nearest(distance, np.ones(len(values), dtype=np.int64), (note_on_searches(triangles, *counts),))
+        distance, windows = distance_to_segments(triangles, placed, tolerance, report)
+        return Nearest(distance, np.ones(len(values), dtype=np.int64), (note_on_searches(triangles, windows),))
     sides = curve_sides(triangles, placed)
     bounded = sides.regions != 0
-    is_near = sides.reach <= distance * (1 + 1e-9)
+    # What is missing, and which side is which, is decided near the curves: a short search is enough.
+    size = float(np.sqrt(2 * triangles.face_areas.max()))
+    reach = max(3 * size, float(sides.reach[np.isfinite(sides.reach)].max(initial=0.0)) * (1 + 1e-9))
+    near, windows = distance_to_segments(triangles, placed, tolerance, report, reach)
+    counts = [windows]
+    is_near = sides.reach <= near * (1 + 1e-9)
     side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
     turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
-    values = np.where(turned, np.copysign(distance, side), values)
-    missing, more = missing_parts(triangles, values, parts, placed, distance, sides, spacing, report)
+    values = np.where(turned, np.copysign(np.minimum(near, reach), side), values)
+    missing, more = missing_parts(triangles, values, parts, placed, near, sides, spacing, report, reach)
     counts += more
     completed = float(missing.lengths.sum())
-    if completed > 0:
-        to_missing, windows = distance_to_segments(triangles, missing, tolerance, report)
-        distance = np.where(bounded, distance, np.minimum(distance, to_missing))
-        counts.append(windows)
+    # A path from a bounded region to what is missing elsewhere crosses a curve, so that one search is enough.
+    distance, windows = distance_to_segments(
+        triangles, placed.joined(missing) if completed > 0 else placed, tolerance, report
+    )
+    counts.append(windows)
     there_length = sum(float(part.lengths.sum()) for part in parts)
     share = completed / (completed + there_length or 1.0)
     note = SharpenedToCurves(share, len(sides.free_ends), float(bounded.mean()))
@@ -215,15 +220,19 @@ def missing_parts(
     sides: CurveSides,
     spacing: float,
     report: Report | None,
+    reach: float,
 ) -> tuple[PlacedSegments, list[int]]:
-    """Find the parts of the zero set of φ that complete the curves, and the number of windows of each search."""
+    """Find the parts of the zero set of φ that complete the curves, and the number of windows of each search.
+
+    `distance`, (n,), is inf beyond `reach`, which is three times the size of a face or more.
+    """
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
     apart = distance[corners].mean(axis=1) > size
     counts = []
     if len(sides.free_ends):
         ends = CurveSegments.of_points(placed.nodes[sides.free_ends])
-        to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, report)
+        to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, report, reach)
         counts.append(windows)
         beyond = to_ends <= distance * (1 + 1e-3)
         apart |= beyond[corners].all(axis=1)
@@ -232,11 +241,10 @@ def missing_parts(
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     unsided = [part for part in parts if not part.oriented]
     if unsided:
-        near, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, unsided), ROUGHLY, report)
+        width = FALSE_ZERO_WIDTH * spacing
+        near, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, unsided), ROUGHLY, report, width)
         sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
-        values = without_false_zeros(
-            triangles, values, near < FALSE_ZERO_WIDTH * spacing, corners[np.concatenate(sided)].ravel()
-        )
+        values = without_false_zeros(triangles, values, near < width, corners[np.concatenate(sided)].ravel())
         counts.append(windows)
     return zero_line(triangles, values, apart), counts
 
