@@ -13,16 +13,17 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 
 
 def cotan_matrix(triangles: IntrinsicMesh) -> sparse.csr_matrix:
-    """Upper triangle of C (Eq. 10) on the vertices, the negative of the paper's matrix: ``φᵀ C φ = ∫ |∇φ|²``."""
+    """Return the upper triangle of C (Eq. 10), (n, n), the negative of the paper's matrix: ``φᵀ C φ = ∫ |∇φ|²``."""
     half = 0.5 * np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
     diagonal = half + np.roll(half, 1, axis=1)
     return assemble(triangles.corner_vertices, diagonal, -half, triangles.n_vertices)
 
 
 def divergence(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
-    """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩`` (Sec. 5.5): the negative of the paper's divergence, as C is of its Laplacian.
+    """(n,) b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩`` (Sec. 5.5), for (m,) directions Y of faces, in their layouts.
 
-    The area-weighted gradient of corner k's hat function is half the opposite edge, turned inward by 90°.
+    It is the negative of the paper's divergence, as C is of its Laplacian. The area-weighted gradient of corner k's hat
+    function is half the opposite edge, rotated inwards by 90°.
     """
     facing = np.roll(triangles.corner_vertices, 1, axis=1)  # edge k faces corner k + 2
     starts, shape = np.arange(0, facing.size + 1, 3), (triangles.n_vertices, triangles.n_faces)
@@ -31,9 +32,10 @@ def divergence(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
 
 
 def assemble(unknowns: Ints, diagonal: Floats, coupling: NDArray[Any], n: int) -> sparse.csr_matrix:
-    """Upper triangle of the Hermitian sum of element matrices, with its whole diagonal stored.
+    """Sum Hermitian 3×3 element matrices; return the upper triangle, (n, n), with its whole diagonal stored.
 
-    `coupling`, (m, 3), is the entry of each element matrix in row k and column k + 1 (cyclically).
+    For each element, `unknowns`, (m, 3), are its rows, `diagonal`, (m, 3), is its diagonal, and `coupling`, (m, 3), its
+    entry in row k and column k + 1 (cyclically).
     """
     following = np.roll(unknowns, -1, axis=1)
     above = np.where(unknowns <= following, coupling, np.conj(coupling))

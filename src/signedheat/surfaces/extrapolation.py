@@ -15,23 +15,23 @@ from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource
 
 FINE_EXTENT = 263.0
-"""Extent of a surface, in h, above which τ grows: that of 20,000 vertices in equilateral triangles."""
+"""τ grows on surfaces with a larger extent than this, in h: that of 20,000 vertices in equilateral triangles."""
 
 
 @dataclass(frozen=True)
 class Extrapolated:
     """Directions extrapolated from one diffusion time and from how they change with it: the default on surfaces.
 
-    Heat falls by the factor e within √t. At τ = 1 that is about a cell, too little for the cells to resolve: the
-    directions of step 1 keep an error of the size h²/t, which does not fall as the cells get smaller. A larger τ
-    smooths the source, with an error of the size √t. Of the directions Y and their first two derivatives by t the
-    combination in which both cancel is used. On triangles the error then falls about like their size, and is less than
-    half as large on fine meshes; on the coarsest there is little to gain. The derivatives need no other factor: step 1
-    solves three times with the same one. By default τ is 3 up to about 20,000 vertices, and beyond grows with the fifth
-    root of their number.
+    Heat falls by the factor e within √t. At τ = 1 that is about a cell, which the cells do not resolve. So directions
+    keep an error of the size h²/t, which does not fall as the cells get smaller. A larger τ smooths the source, with an
+    error of the size √t. Both errors cancel in a combination of the directions Y and their first two derivatives by t.
+    On triangles the error then falls about like their size, and is less than half as large on fine meshes; on the
+    coarsest there is little to gain. The derivatives need no other matrix: the linear system of step 1 is factorised
+    once, and solved three times. By default τ is 3 up to about 20,000 vertices, and beyond grows with the fifth root of
+    their number.
 
-    Where an oriented curve on a surface ends, away from its boundary, heat completes what is missing, and Y depends on
-    t by more than an error: in that connected part of the surface the directions of τ/3 are used unchanged.
+    Where an oriented curve ends, away from the boundary of the surface, heat completes it, and Y depends on t by more
+    than an error. In that connected part of the surface the directions of τ/3 are used unchanged.
 
     Parameters
     ----------
@@ -70,10 +70,10 @@ Diffusion = float | Extrapolated
 
 
 def default_diffusion(discretization: Discretization) -> Diffusion:
-    """`Extrapolated` on surfaces, where directions limit the accuracy; 1 in space.
+    """Return `Extrapolated` on surfaces, where directions limit the accuracy, and 1 in space.
 
-    Extrapolation leaves an error like 1/τ², and Y is smoothed over h √τ where it turns back: with τ like h^(−2/5) both
-    fall alike.
+    Extrapolation leaves an error like 1/τ², and Y is smoothed over h √τ where it changes abruptly. With τ like h^(−2/5)
+    both errors fall at the same rate.
     """
     if not isinstance(discretization, SurfaceDiscretization):
         return 1.0
@@ -82,7 +82,10 @@ def default_diffusion(discretization: Discretization) -> Diffusion:
 
 
 def lowered_for_times(discretization: Discretization, sources: Sequence[Any], diffusion: Diffusion) -> list[SourceTerm]:
-    """Lower the sources for their τ, and once more for the parts of a surface in which curves end."""
+    """Lower the sources for a diffusion time, and once more for the parts of a surface in which curves end.
+
+    With `Extrapolated`, the result is a source for all parts, one for those parts, or both in this order.
+    """
     if not isinstance(diffusion, Extrapolated):
         return [discretization.lower(sources, diffusion)]
     source = discretization.lower(sources, diffusion.tau)
@@ -98,7 +101,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
 
 
 def blended(sources: Sequence[SourceTerm], directions: Iterable[NDArray[Any]]) -> NDArray[Any]:
-    """Combine the directions of the sources of `lowered_for_times` to Y on all faces."""
+    """Combine the directions (m,) of each of the sources of `lowered_for_times` to Y on all faces."""
     everywhere, *at_ends = directions
     for ending in at_ends:
         assert isinstance(sources[0], SurfaceSource)

@@ -1,4 +1,4 @@
-"""Discretisation by intrinsic triangulations, made once for a mesh or anew for each set of sources (Sec. 9.4)."""
+"""Discretisation by intrinsic triangulations, made once for a mesh, or anew for each set of sources (Sec. 9.4)."""
 
 from __future__ import annotations
 
@@ -19,45 +19,47 @@ from .surface_discretization import SurfaceDiscretization, refuse_too_many, vert
 from .triangle_mesh import TriangleMesh
 
 LARGE_ANGLE_SHARE = 0.0015
-"""Fraction of the area in triangles with an angle that is larger than all angles where none is below `LARGEST_ANGLE`,
-120°, from which a mesh is refined."""
+"""A mesh is refined if at least this share of its area is in triangles with an angle above 120°, the largest that a
+triangle without angles below `LARGEST_ANGLE` has."""
 SMALL_ANGLE_SHARE = 0.1
-"""Fraction of the area in triangles with an angle below `SMALL_ANGLE`, from which a mesh is refined."""
+"""A mesh is refined if at least this share of its area is in triangles with an angle below `SMALL_ANGLE`."""
 SMALL_ANGLE = 10.0
-"""Angle in degrees. Needles resolve distance by their length only, even right-angled ones."""
+"""Angle below which triangles are needles, in degrees. These resolve distance along their length only."""
 AUTO_ANGLE = 20.0
-"""Smallest angle of "auto", in degrees: the vertices that 28 would take are better spent on large triangles."""
+"""Smallest angle of ``intrinsic="auto"``, in degrees. With 28 there would be many more vertices in small triangles."""
 COARSEST_TRIANGLE = 1.41
-"""Largest circumradius, relative to that of a mean triangle: larger ones resolve neither curves nor directions."""
+"""Largest circumradius, relative to that of a mean triangle; larger triangles resolve neither curves nor directions."""
 BYTES_PER_REFINED = 750
-"""Memory of each triangle of a refinement, besides that of distance on it."""
+"""Memory per triangle of a refinement, besides that of distance on it."""
 SHARE_OF_PIECE = 0.5
-"""h, relative to the length of the pieces of a curve that is to be completed, if h would be larger otherwise."""
+"""For curves with gaps that are to be completed, h is at most this share of the length of their pieces, or as large as
+the triangles along them."""
 MOLLIFIED_MARGIN = 1e-9
-"""Margin of the triangle inequalities, relative to the mean length, in the triangles that the method runs on."""
+"""Least margin of the triangle inequalities, relative to the mean edge length, in the triangles of the method."""
 
 
 @discretize.register
 def _(domain: IntrinsicTriangulation) -> SurfaceDiscretization:
+    """Discretise an intrinsic triangulation; fields have values at all of its vertices."""
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     return lowered(domain)
 
 
 @dataclass(frozen=True, eq=False)
 class Retriangulated:
-    """A mesh of which `adapt` makes an intrinsic triangulation for the sources; fields are reported on the mesh."""
+    """A mesh that `adapt` discretises by an intrinsic triangulation for given sources; fields are on the mesh."""
 
     mesh: TriangleMesh
     progress: Progress | None = field(default=None, repr=False)
     coarsest: ClassVar[float] = COARSEST_TRIANGLE
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Refine the mesh intrinsically, with the sources along edges."""
+        """Refine the mesh intrinsically with the sources along edges; return the discretisation, and sources on it."""
         return refined(self.mesh, self.progress, sources, coarsest=self.coarsest).adapt(sources)
 
 
 class RetriangulatedForZeroSet(Retriangulated):
-    """`Retriangulated` for the zero set alone, with h small enough that small pieces of curves are not blurred."""
+    """`Retriangulated` for the zero set alone, with h so small that short curves with gaps are not blurred."""
 
     coarsest: ClassVar[float] = np.inf
 
@@ -75,7 +77,10 @@ class RetriangulatedForZeroSet(Retriangulated):
 
 
 def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
-    """Discretise a domain; refine meshes with many large or small angles, unless faces are too thin for that."""
+    """Discretise a domain, as ``intrinsic="auto"`` does: meshes with many large or small angles are refined.
+
+    They are not refined if faces are too thin for that.
+    """
     if isinstance(domain, TriangleMesh) and is_spoiled(domain):
         try:
             return refined(domain, progress, angle=AUTO_ANGLE)
@@ -85,14 +90,14 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
 
 
 def checked_intrinsic(intrinsic: bool | Literal["auto"]) -> bool | Literal["auto"]:
-    """Return the option `intrinsic` of `SignedHeatSolver`; refuse what it cannot be."""
+    """Return the option `intrinsic` of `SignedHeatSolver` if it is valid, and raise `SignedHeatError` otherwise."""
     if not (isinstance(intrinsic, bool) or (isinstance(intrinsic, str) and intrinsic == "auto")):
         raise SignedHeatError(f"intrinsic must be 'auto', True or False, not {intrinsic!r:.40}", element="intrinsic")
     return intrinsic
 
 
 def is_spoiled(mesh: TriangleMesh) -> bool:
-    """Whether so much of the area has a large angle, or is needles, that the mesh is to be refined."""
+    """Whether so much of the area is in triangles with a large angle, or in needles, that the mesh is to be refined."""
     a, b, c = np.sort(mesh.edge_lengths[mesh.edges.face_edges], axis=1).T
     areas = mesh.face_areas
     total = max(float(areas.sum()), 1e-300)
@@ -108,7 +113,10 @@ def refined(
     angle: float = 28.0,
     coarsest: float = COARSEST_TRIANGLE,
 ) -> SurfaceDiscretization:
-    """Discretise a mesh by its intrinsic Delaunay refinement; fields are reported on the mesh, and kept on both."""
+    """Discretise a mesh by its intrinsic Delaunay refinement; fields are on the mesh, and also kept on the refinement.
+
+    The other arguments are those of `intrinsic_delaunay`.
+    """
     # refinement only adds triangles
     refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_PER_REFINED * mesh.n_faces)
     domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
@@ -117,7 +125,10 @@ def refined(
 
 
 def lowered(triangulation: IntrinsicTriangulation, /, **options: Any) -> SurfaceDiscretization:
-    """Discretise an intrinsic triangulation, with longer edges if triangles are flat; options override fields."""
+    """Discretise an intrinsic triangulation, with lengthened edges if triangles are flat.
+
+    Options replace attributes of the `SurfaceDiscretization`.
+    """
     triangles = triangulation.triangles
     lengths, added = mollify(triangles.edge_lengths, MOLLIFIED_MARGIN)
     if added:

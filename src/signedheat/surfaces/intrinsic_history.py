@@ -1,9 +1,9 @@
 """The steps by which an intrinsic triangulation was made, and the transfer of points and lines through them.
 
 Every step (an edge flip, or a split of a face or an edge) exchanges triangles on four points that have one affine
-dependency ``Σ c_k p_k = 0``. The weights of a point in an old triangle are moved along c until another one vanishes;
-then they are nonnegative in a new triangle. No angle is measured and no line is traced, so that the transfer cannot
-fail, and a point on an edge that stays remains on it exactly.
+dependency ``Σ c_k p_k = 0``. The weights of a point in an old triangle are moved along c until another weight vanishes.
+Then they are nonnegative in a new triangle. No angle is measured and no line is traced, so that the transfer cannot
+fail, and a point on an edge that both triangulations have stays exactly on it.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Lines(NamedTuple):
     vectors: Floats  # (r, k, 3) vectors transported along the line, as differences of barycentric coordinates
 
     def chosen(self, rows: Ints) -> Lines:
-        """Choose rows, in this order."""
+        """Return the lines with these rows only, in this order."""
         return Lines(self.owners[rows], self.faces[rows], self.starts[rows], self.ends[rows], self.vectors[rows])
 
 
@@ -60,15 +60,18 @@ class History(Frozen):
     weights: Floats
 
     def forward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
-        """Transfer points of `before`, and vectors (p, k, 3) at them, to `after`."""
+        """Transfer points of `before`, and (p, k, 3) vectors at them, to `after`.
+
+        Points are (p,) faces and (p, 3) barycentric coordinates; vectors are differences of such. The same is returned.
+        """
         return self._transferred(self._later, faces, rows_of(barycentric, vectors))
 
     def backward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
-        """Transfer points of `after`, and vectors (p, k, 3) at them, to `before`."""
+        """Transfer points of `after`, and (p, k, 3) vectors at them, to `before`; see `forward`."""
         return self._transferred(self._earlier, faces, rows_of(barycentric, vectors))
 
     def inserted(self) -> tuple[Ints, Floats]:
-        """Locate the inserted vertices, in order, on `before`; return faces and barycentric coordinates."""
+        """Locate the inserted vertices, in order, on `before`: (k,) faces, and (k, 3) barycentric coordinates."""
         vertex = self.steps[:, 3]
         # each face at an edge is split by a step of its own: the first of them is enough
         rows = np.flatnonzero((vertex >= 0) & (np.diff(vertex, prepend=-1) != 0))
@@ -84,17 +87,22 @@ class History(Frozen):
     def _transferred(
         self, links: Links, faces: Ints, rows: Floats, begin: NDArray[np.int32] | None = None
     ) -> tuple[Ints, Floats, Floats]:
-        """Carry points through the steps from `begin` on, by default through all that change their faces."""
+        """Carry (p,) points through the steps from (p,) `begin` on, by default through all that change their faces.
+
+        `rows`, (p, 1 + k, 3), are barycentric coordinates and vectors.
+        """
         faces = np.array(faces, dtype=np.int64)
         transfer(self.steps, self.weights, links, links.first[faces] if begin is None else begin, faces, rows)
         return faces, rows[:, 0].copy(), rows[:, 1:].copy()
 
     @cached_property
     def _later(self) -> Links:
+        """For each face of `before`, the steps that change it, from the first to the last."""
         return Links(True, *linked_steps(self.steps, self._most_faces, True))
 
     @cached_property
     def _earlier(self) -> Links:
+        """For each face of `after`, the steps that changed it, from the last to the first."""
         return Links(False, *linked_steps(self.steps, self._most_faces, False))
 
     @property
@@ -121,21 +129,21 @@ class History(Frozen):
 
 
 class Links(NamedTuple):
-    """Which steps change each face, one after the other, so that a point visits only those that change its face."""
+    """The steps that change each face, as linked lists, so that a point visits only those that change its face."""
 
-    forward: bool  # whether they lead from the first step to the last, or back
-    first: NDArray[np.int32]  # (m,) first step that changes each face, −1 if there is none
-    next_of_face: NDArray[np.int32]  # (n, 3) the next one, for each face of a step
+    forward: bool  # whether lists lead from the first step to the last, or back
+    first: NDArray[np.int32]  # (m,) first step in the list of each face, −1 if there is none
+    next_of_face: NDArray[np.int32]  # (n, 3) the next step in the list, for each face of a step
 
 
 def rows_of(barycentric: Floats, vectors: Floats | None) -> Floats:
-    """(p, 1 + k, 3) points and vectors at them, in rows: both change alike where triangles are exchanged."""
+    """(p, 1 + k, 3) barycentric coordinates of p points, each followed by its (k, 3) vectors, as `transfer` needs."""
     points = np.asarray(barycentric, dtype=np.float64)[:, None]
     return points.copy() if vectors is None else np.concatenate([points, vectors], axis=1)
 
 
 def edge_middles(triangles: IntrinsicMesh) -> tuple[Ints, Floats, Floats]:
-    """Faces and barycentric coordinates of the edges' middle points, and (e, 1, 3) vectors from tail to head."""
+    """Midpoints of edges, as (e,) faces and (e, 3) barycentric coordinates, and (e, 1, 3) vectors from tail to head."""
     side = triangles.first_halfedges
     faces, k, rows = side // 3, side % 3, np.arange(len(side))
     middle, along = np.zeros((len(side), 3)), np.zeros((len(side), 1, 3))
@@ -146,13 +154,16 @@ def edge_middles(triangles: IntrinsicMesh) -> tuple[Ints, Floats, Floats]:
 
 
 def for_tracing(triangles: IntrinsicMesh) -> Gluing:
-    """Make a gluing to trace lines on, without room for a history."""
+    """Make a gluing of triangles to trace lines on, without room for a history."""
     gluing = glue(triangles)
     return gluing._replace(steps=gluing.steps[:0].copy(), weights=gluing.weights[:0].copy())
 
 
 def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Floats) -> Lines:
-    """Trace straight lines, given by midpoints (p, 3) and vectors (p, k, 3) there: the first is the whole line."""
+    """Trace p straight lines, given by (p,) faces and (p, 3) barycentric coordinates of midpoints, and vectors there.
+
+    Of the (p, k, 3) vectors, the first is the whole line; the others are carried along it.
+    """
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5
     room = 4 * len(faces) + 16
@@ -176,7 +187,7 @@ def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Fl
 
 
 def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> Ints:
-    """Ids of lines whose traces are not finite or twice too long, because nearly flat triangles turned them."""
+    """(k,) ids of lines whose traces, through nearly flat triangles, are not finite, or twice as long as `lengths`."""
     along, corners = lines.vectors[:, 0], triangles.corner_positions[lines.faces]
     with np.errstate(all="ignore"):  # they may have overflowed
         traced, rounding = np.abs((along * corners).sum(axis=1)), 1e-5 * (np.abs(along) * np.abs(corners)).sum(axis=1)
@@ -185,7 +196,8 @@ def misplaced_lines(triangles: IntrinsicMesh, lines: Lines, lengths: Floats) -> 
 
 
 BEFORE_STEP = np.full((4, 3, 3), -1)
-"""By kind of step, face and corner: which of the four points is that corner before the step; `AFTER_STEP`, after it."""
+"""(4, 3, 3) by kind of step, face and corner: which of the four points is at that corner before the step, or after it
+in `AFTER_STEP`."""
 AFTER_STEP = np.full((4, 3, 3), -1)
 BEFORE_STEP[TURN_STEP, 0], AFTER_STEP[TURN_STEP, 0] = [0, 1, 2], [0, 2, 1]
 BEFORE_STEP[FLIP_STEP, :2], AFTER_STEP[FLIP_STEP, :2] = [[0, 1, 2], [1, 0, 3]], [[3, 2, 0], [2, 3, 1]]
@@ -198,7 +210,7 @@ SQUARE_LENGTH_ROUNDING = 1e-10
 
 @compiled
 def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Link the steps that change each face: see `Links`."""
+    """Return the arrays `first` and `next_of_face` of `Links`."""
     first = np.full(n_faces, -1, np.int32)
     following_step = np.full((len(steps), 3), -1, np.int32)
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
@@ -216,7 +228,10 @@ def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.i
 
 @compiled
 def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32], faces: Ints, rows: Floats) -> None:
-    """Carry points and vectors (p, 1 + k, 3) through the steps that change their faces, from `begin` on, in place."""
+    """Carry points and vectors through the steps that change their faces, in place.
+
+    `begin` is the first step for each point, or −1. Points have (p,) faces, and with vectors (p, 1 + k, 3) rows.
+    """
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
         n = np.int64(begin[p])
@@ -235,7 +250,11 @@ def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32
 def exchange(
     kind: int, c: Floats, forward: bool, corners: Ints, start: int, new_corners: Ints, new_start: Ints, rows: Floats
 ) -> int:
-    """Transfer a point, the first row, and vectors over one step; return which of the step's new faces contains it."""
+    """Transfer a point, the first row, and vectors over one step, in place; return which new face contains the point.
+
+    `c` are the weights of the step's affine dependency. `corners` are the indices among its four points of the corners
+    of the old face, and `new_corners` those of all new faces; `start` and `new_start` are their first sides.
+    """
     lead = 3 if kind == SPLIT_FACE else 2  # points with a smaller index are on one side of the dependency
     x = np.zeros(4)
     gone, place = -1, 0
@@ -262,7 +281,7 @@ def exchange(
 
 @compiled
 def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
-    """Squared length of a vector in a face, from differences of barycentric coordinates, and the sum of |terms|."""
+    """Squared length of a vector in face f, a difference of barycentric coordinates; and the sum of absolute terms."""
     square, size = 0.0, 0.0
     for k in range(3):
         term = v[k] * v[(k + 1) % 3] * g.length[g.edge[3 * f + k]] ** 2

@@ -38,7 +38,7 @@ from ..mesh.gluing import (
 PER_FACE = ("tail", "edge", "forward", "front", "sibling")
 PER_EDGE = ("start", "length", "fixed", "flips")
 TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "narrow", "group", "extent")
-"""Names of the arrays of a `Gluing`, per face and per edge, and of an `Agenda`, that grow with the triangulation."""
+"""Names of the arrays that grow with the triangulation: of a `Gluing`, per face and per edge, and of an `Agenda`."""
 
 
 def refine_all(
@@ -46,8 +46,8 @@ def refine_all(
 ) -> tuple[Gluing, Ints, Bools, bool]:
     """Refine a Delaunay triangulation, in place, until no face is thin, then none large: see `intrinsic_delaunay`.
 
-    Returns it; for each edge (e,) the fixed edge of the input that it is part of, or −1; the result of `close_faces`;
-    and whether refinement ended before the limit on the number of vertices.
+    Return the triangulation, the (e,) fixed edges of the input that edges are part of, or −1, the result of
+    `close_faces`, and whether refinement ended before the limit on the number of vertices. `angle` is in radians.
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
@@ -64,7 +64,10 @@ def refine_all(
 
 
 def refined(gluing: Gluing, agenda: Agenda, goal: Goal, progress: Progress | None) -> tuple[Gluing, Agenda, int]:
-    """Refine until the goal or the vertex limit is reached; return the arrays, perhaps longer, and why it ended."""
+    """Refine until the goal or the vertex limit is reached; return both arguments, perhaps longer, and why it ended.
+
+    That is one of the results of `refine`.
+    """
     list_all(gluing, agenda, goal)
     listed = np.flatnonzero(agenda.bins >= 0)  # the largest faces come first, so the current list shows progress
     done = 0.0
@@ -82,7 +85,7 @@ def refined(gluing: Gluing, agenda: Agenda, goal: Goal, progress: Progress | Non
 
 
 def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
-    """(m,) faces whose shortest side joins vertices that nearly coincide."""
+    """(m,) whether the shortest side of each face joins vertices that nearly coincide."""
     n_faces = int(gluing.counts[N_FACES])
     faces = np.arange(n_faces)
     lengths = gluing.length[gluing.edge[: 3 * n_faces]].reshape(-1, 3)
@@ -93,7 +96,7 @@ def close_faces(gluing: Gluing, agenda: Agenda) -> Bools:
 
 
 def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
-    """Fix boundary and nonmanifold edges; return the ids of all fixed edges, and the work lists of refinement."""
+    """Fix boundary and nonmanifold edges; return the (s,) ids of all fixed edges, and the work lists of refinement."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     counts = np.bincount(gluing.edge[: 3 * n_faces], minlength=n_edges)
     gluing.fixed[:n_edges] |= counts != 2
@@ -125,11 +128,12 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
 
 
 REFINED, ARRAYS_FULL, LIMIT_REACHED, PAUSED = 0, 1, 2, 3
-"""Why `refine` returned: no bad face is left; arrays are full; vertex limit reached; pause to report progress."""
+"""Why `refine` returned: no bad face is left; arrays are full; the vertex limit is reached; or it pauses so that
+progress is reported."""
 NARROW_ANGLE = np.pi / 3
-"""Where segments meet at less than this, or a vertex has a smaller total angle, small angles cannot be avoided."""
+"""Where segments meet at less than this angle, or a vertex has less in total, small angles cannot be avoided."""
 BAD_FACE_LISTS = 256
-"""Number of lists of bad faces: two for each power of two of the circumradius."""
+"""Number of lists of bad faces, by circumradius: two for each power of two."""
 
 
 class Agenda(NamedTuple):
@@ -153,16 +157,19 @@ class Agenda(NamedTuple):
 
 
 class Goal(NamedTuple):
-    """When refinement is done: tan²(α/2) of the smallest angle α, largest circumradius, and limit on the vertices."""
+    """When refinement is done."""
 
-    angle: float
-    radius: float
-    max_vertices: int
+    angle: float  # tan²(α/2) of the smallest angle α
+    radius: float  # the largest circumradius
+    max_vertices: int  # limit on the number of vertices
 
 
 @compiled
 def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
-    """Insert vertices until all faces meet the goal, if possible; pause after `patience`; return why it stopped."""
+    """Insert vertices until all faces meet the goal, if possible, or `patience` of them; return why it stopped.
+
+    That is `REFINED`, `ARRAYS_FULL`, `LIMIT_REACHED` or `PAUSED`.
+    """
     pause = g.counts[N_VERTICES] + patience
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     while flip_until_delaunay(g, agenda.stack, agenda.stacked):
@@ -188,7 +195,7 @@ def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
 
 @compiled
 def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
-    """Tell whether a face is too thin or too large; return also its shortest side, opposite to its smallest angle."""
+    """Return whether face f is too thin or too large, and the halfedge of its shortest side, opposite the least angle."""
     h = 3 * f
     for k in range(1, 3):
         if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
@@ -199,15 +206,15 @@ def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
 
 @compiled
 def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
-    """Put a face on its list of bad faces, if it is bad and not listed yet."""
+    """Put face f on its list of bad faces, if it is bad and not listed yet."""
     bad, h = is_bad(g, f, goal)
     if agenda.listed[f] or not bad:
         return
     n, d = tangent_at(g, preceding(h))
     radius = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
-    place = min(max(BAD_FACE_LISTS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), BAD_FACE_LISTS - 1)
-    agenda.next_face[f] = agenda.bins[place]
-    agenda.bins[place] = f
+    bin_index = min(max(BAD_FACE_LISTS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), BAD_FACE_LISTS - 1)
+    agenda.next_face[f] = agenda.bins[bin_index]
+    agenda.bins[bin_index] = f
     agenda.listed[f] = True
 
 
@@ -221,12 +228,12 @@ def list_all(g: Gluing, agenda: Agenda, goal: Goal) -> None:
 @compiled
 def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
     """Remove a bad face of (nearly) the largest circumradius from the lists and return it; −1 if there is none."""
-    for place in range(BAD_FACE_LISTS - 1, -1, -1):
-        while agenda.bins[place] >= 0:
-            f: int = agenda.bins[place]
-            agenda.bins[place] = agenda.next_face[f]
+    for bin_index in range(BAD_FACE_LISTS - 1, -1, -1):
+        while agenda.bins[bin_index] >= 0:
+            f: int = agenda.bins[bin_index]
+            agenda.bins[bin_index] = agenda.next_face[f]
             agenda.listed[f] = False
-            agenda.seen[1] = place
+            agenda.seen[1] = bin_index
             if is_bad(g, f, goal)[0]:
                 return f
     return -1
@@ -236,7 +243,8 @@ def next_bad(g: Gluing, agenda: Agenda, goal: Goal) -> int:
 def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     """Insert a vertex at the circumcentre of bad face f, or on a segment in the way; return False if arrays are full.
 
-    A face whose shortest side joins vertices that nearly coincide stays, unless it is a cap with nothing in the way.
+    Nothing is inserted if the face cannot be improved, or if its shortest side joins vertices that nearly coincide,
+    unless it is a cap with no segment in the way.
     """
     h = is_bad(g, f, goal)[1]
     close = coincide(g, agenda, h)
@@ -260,7 +268,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
 
 @compiled
 def corners_of(g: Gluing, f: int) -> Complexes:
-    """(3,) the corners of a face in its frame: its first halfedge runs along the positive real axis from the origin."""
+    """(3,) corners of face f in its frame: its first halfedge runs from the origin along the positive real axis."""
     corners = np.zeros(3, np.complex128)
     corners[1], corners[2] = g.length[g.edge[3 * f]], apex(g, 3 * f)
     return corners
@@ -268,7 +276,7 @@ def corners_of(g: Gluing, f: int) -> Complexes:
 
 @compiled
 def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
-    """Whether the two ends of a halfedge nearly coincide."""
+    """Whether the two ends of halfedge h nearly coincide."""
     group: int = agenda.group[g.tail[h]]
     other: int = agenda.group[g.tail[following(h)]]
     is_short: bool = g.length[g.edge[h]] <= agenda.extent[group]
@@ -277,7 +285,7 @@ def coincide(g: Gluing, agenda: Agenda, h: int) -> bool:
 
 @compiled
 def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
-    """Whether an angle of the face exceeds 150°, opposite to a side whose ends do not nearly coincide."""
+    """Whether an angle of face f exceeds 150°, and the ends of the opposite side do not nearly coincide."""
     for h in range(3 * f, 3 * f + 3):
         n, d = tangent_at(g, preceding(h))
         if n > 13.9 * d:
@@ -287,7 +295,7 @@ def is_cap(g: Gluing, agenda: Agenda, f: int) -> bool:
 
 @compiled
 def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
-    """Whether the small angle opposite to h cannot be avoided: it is given by the surface or by its segments."""
+    """Whether the small angle opposite halfedge h cannot be avoided, as the surface or its segments determine it."""
     corner = preceding(h)
     if agenda.narrow[g.tail[corner]] and sector(g, corner) < NARROW_ANGLE:
         return True
@@ -304,7 +312,7 @@ def is_hopeless(g: Gluing, agenda: Agenda, h: int) -> bool:
 
 @compiled
 def sector(g: Gluing, corner: int) -> float:
-    """Angle at the tail of a halfedge between the segments on either side of it, or the total angle, summed up to π."""
+    """Angle at the tail of a halfedge between the next segments on either side, or the total angle; or π if larger."""
     n, d = tangent_at(g, corner)
     total: float = 2.0 * np.arctan2(np.sqrt(n), np.sqrt(d))
     for side in range(2):
@@ -322,7 +330,7 @@ def sector(g: Gluing, corner: int) -> float:
 
 @compiled
 def narrow_vertices(g: Gluing) -> Bools:
-    """(n,) vertices at which two segments meet at less than 60°, or with a total angle of less than 60°."""
+    """(n,) whether two segments meet at less than 60° at each vertex, or its total angle is less than 60°."""
     narrow = np.zeros(g.counts[N_VERTICES], dtype=np.bool_)
     for corner in range(3 * g.counts[N_FACES]):
         if not narrow[g.tail[corner]]:
@@ -339,7 +347,7 @@ def has_room(g: Gluing, agenda: Agenda, ring: int) -> bool:
 
 @compiled
 def push_edges_of(g: Gluing, agenda: Agenda, step: int) -> None:
-    """Push onto the stack the edges of all faces that steps of the history, from number `step` on, have changed."""
+    """Push the edges of all faces that steps of the history, from number `step` on, have changed onto the stack."""
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)
     for n in range(step, g.counts[N_STEPS]):
         faces_around(g.steps, n, around, start)
@@ -351,7 +359,7 @@ def push_edges_of(g: Gluing, agenda: Agenda, step: int) -> None:
 
 @compiled
 def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
-    """Insert a vertex at p (in the frame of face f), or on the edge of the face that p nearly lies on."""
+    """Insert a vertex at p, in the frame of face f, or on the edge of the face that p nearly lies on."""
     step = g.counts[N_STEPS]
     corners = corners_of(g, f)
     area = corners[1].real * corners[2].imag
@@ -381,7 +389,7 @@ def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
 
 @compiled
 def folded_face(g: Gluing, h: int) -> int:
-    """Find a face two of whose sides are the edge of halfedge h, which `split_edge` cannot split; −1 if none is."""
+    """Return a face two of whose sides are the edge of halfedge h, which `split_edge` cannot split; −1 if none is."""
     y = h
     while True:
         if g.edge[following(y)] == g.edge[h] or g.edge[preceding(y)] == g.edge[h]:
@@ -393,7 +401,10 @@ def folded_face(g: Gluing, h: int) -> int:
 
 @compiled
 def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
-    """Find a vertex opposite to an edge that nearly lies on it, its height and fraction along h; −1, ∞, ½ if none."""
+    """Find a vertex opposite the edge of halfedge h that nearly lies on it; return it, its height, and where along h.
+
+    If there is none, −1, ∞ and ½ are returned.
+    """
     nearby, height, fraction, length, y = -1, np.inf, 0.5, g.length[g.edge[h]], h
     while True:
         top = apex(g, y)
@@ -407,7 +418,7 @@ def vertex_near_edge(g: Gluing, h: int) -> tuple[int, float, float]:
 
 @compiled
 def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
-    """Distance of the nearest vertex opposite to an edge from the point at `fraction` along h."""
+    """Distance of the nearest vertex opposite the edge of halfedge h from the point at `fraction` along h."""
     nearest: float = np.inf
     length, y = g.length[g.edge[h]], h
     while True:
@@ -420,7 +431,7 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
 
 @compiled
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
-    """Split a segment that keeps face f from being removed; return False if the arrays have no room for it.
+    """Split the segment of halfedge h, so that face f can be improved; return False if the arrays have no room for it.
 
     It is split in the middle; or beside a vertex that nearly lies on it; or, if segments meet at a small angle at one
     end, at a power of two from that end (Ruppert 1995). A face with two sides on the segment is split instead.
@@ -460,12 +471,15 @@ def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool
 
 
 CENTER_INSIDE, CENTER_BLOCKED, CENTER_LOST = 0, 1, 2
-"""Outcomes of `find_circumcenter`."""
+"""Outcomes of `find_circumcenter`: it lies in the face reached, beyond a segment, or cannot be found."""
 
 
 @compiled
 def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[complex, int]:
-    """Unfold the face beyond halfedge h; return its apex, and 1 if it is then counter-clockwise, else −1."""
+    """Unfold the face beyond halfedge h, whose ends are at `tail` and `head`, into the plane.
+
+    Return its apex, and 1 if its corners are then counter-clockwise, else −1. `side` is the same for the face of h.
+    """
     t = g.sibling[h]
     if g.forward[t] == g.forward[h]:
         side = -side
@@ -479,7 +493,10 @@ def unfold(g: Gluing, h: int, side: int, tail: complex, head: complex) -> tuple[
 
 @compiled
 def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
-    """Walk from a face's barycentre to its circumcentre; return outcome, face or halfedge reached, and place there."""
+    """Walk from the barycentre of face f to its circumcentre; return the outcome, and the face or halfedge reached.
+
+    Also return the position of the circumcentre in the frame of the face reached, or 0.
+    """
     corners = corners_of(g, f)
     base, x, y = corners[1].real, corners[2].real, corners[2].imag
     if not y > 0.0:
@@ -519,7 +536,7 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
 
 @compiled
 def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
-    """Find a segment visible from p (in the frame of face f) whose diametral circle contains p; −1 if there is none."""
+    """Return a halfedge of a segment whose diametral circle contains p, in the frame of face f; −1 if none is visible."""
     ends, halfedges = agenda.seen_sides, agenda.halfedges
     corners = corners_of(g, f)
     for k in range(3):
@@ -553,12 +570,12 @@ def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
 
 
 NEAR_GROUP = 0.01
-"""Vertices nearly coincide where the size of their group is less than this fraction of the distance to others."""
+"""Vertices of a group nearly coincide if the size of the group is less than this fraction of the distance to others."""
 
 
 @compiled
 def root(parent: Ints, a: int) -> int:
-    """Find the representative of the group of a vertex (union–find with path halving)."""
+    """Return the representative of the group of vertex a (union–find with path halving)."""
     while parent[a] != a:
         parent[a] = parent[parent[a]]
         a = parent[a]
@@ -567,10 +584,11 @@ def root(parent: Ints, a: int) -> int:
 
 @compiled
 def coinciding(tail: Ints, head: Ints, length: Floats, order: Ints, n_vertices: int) -> tuple[Ints, Floats]:
-    """Group vertices that nearly coincide; return (n,) first vertices of their groups, or −1, and (n,) extents there.
+    """Group vertices that nearly coincide: (n,) first vertices of their groups, or −1, and (n,) extents at these.
 
-    Vertices are joined from short to long edges (Kruskal). A group is kept if its extent, the sum of the lengths that
-    made it, is less than `NEAR_GROUP` times the next edge that leaves it; of nested groups only the largest is kept.
+    Edges have (e,) tails, heads and lengths. Vertices are joined along edges in the given `order`, from short to long
+    (Kruskal). A group is kept if its extent, the sum of the lengths that made it, is less than `NEAR_GROUP` times the
+    next edge that leaves it. Of nested groups only the largest is kept.
     """
     parent, node = np.arange(n_vertices), np.arange(n_vertices)
     first, second = np.full(2 * n_vertices, -1), np.full(2 * n_vertices, -1)

@@ -33,7 +33,7 @@ from .intrinsic_history import History, misplaced_lines, straight_lines
 
 @dataclass(frozen=True, eq=False)
 class ConformingRefinement(Frozen):
-    """Triangles cut so that some curves run along edges."""
+    """Triangles that were cut so that some curves run along edges."""
 
     triangles: IntrinsicMesh  # after the cuts; old vertices first
     marked: Bools  # (e,) edges along which the curves run
@@ -42,7 +42,10 @@ class ConformingRefinement(Frozen):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, parts: Sequence[CurveSegments], heights: Floats) -> ConformingRefinement:
-        """Cut faces along segments, put vertices at points, and sort faces by heights (n,), whatever their order."""
+        """Cut faces along segments, put vertices at points, and sort the result by (n,) heights of the vertices.
+
+        So it does not depend on the order of the given faces.
+        """
         finer, parents, corners = triangles, np.arange(triangles.n_faces), np.eye(3)[None]
         along = np.empty(0, dtype=np.int64)
         if parts:
@@ -58,11 +61,14 @@ class ConformingRefinement(Frozen):
 
     @cached_property
     def children(self) -> tuple[Ints, Ints]:
-        """Starts (f + 1,) and members (m,): the faces after the cuts that each face before them became."""
+        """(f + 1,) starts and (m,) members: member faces, after the cuts, are grouped by the face they are part of."""
         return grouped(self.parents, int(self.parents.max()) + 1)
 
     def push_forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
-        """Transfer points, and vectors (p, k, 3) at them, from the faces before the cuts to the faces after."""
+        """Transfer points, and (p, k, 3) vectors at them, from the faces before the cuts to the faces after.
+
+        Points are (p,) faces and (p, 3) barycentric coordinates, vectors differences of such. The same is returned.
+        """
         segments, child = members_of(*self.children, faces)
         corners = self.corners[child]
         is_flat = np.linalg.det(corners) == 0  # parts without area contain a point only if no other part does
@@ -73,12 +79,15 @@ class ConformingRefinement(Frozen):
         return child[best], weights[best], np.einsum("pvk,pkl->pvl", vectors, to_child[best])
 
     def pull_back(self, faces: Ints, barycentric: Floats) -> tuple[Ints, Floats]:
-        """Transfer points from the faces after the cuts to the faces before."""
+        """Transfer points, (p,) faces and (p, 3) barycentric coordinates, from faces after the cuts to those before."""
         return self.parents[faces], np.einsum("pk,pkl->pl", barycentric, self.corners[faces])
 
 
 def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, Ints, Ints, Ints]:
-    """Sort faces, corners and edges by heights (m, 3); return their old ids, (e,), (m,) and (m, 3), as well."""
+    """Sort faces, their corners, and edges by (m, 3) heights of corners.
+
+    Return the triangles, and the old ids of edges, (e,), faces, (m,), and corners in their face, (m, 3).
+    """
     faces = np.argsort(heights.sum(axis=1), kind="stable")
     turns = (heights[faces].argmin(axis=1)[:, None] + np.arange(3)) % 3
     old = triangles.edges
@@ -94,14 +103,14 @@ def in_order(triangles: IntrinsicMesh, heights: Floats) -> tuple[IntrinsicMesh, 
 
 
 def barycentric_of(triangles: IntrinsicMesh, faces: Ints, points: Complexes) -> Floats:
-    """(n, k, 3) barycentric coordinates of points in face layouts, k to each face."""
+    """(n, k, 3) barycentric coordinates of (n, k) points in the planar layouts of (n,) faces."""
     return np.stack([np.ones_like(points.real), *(np.zeros_like(points.real),) * 2], axis=-1) + differences_of(
         triangles, faces, points - triangles.corner_positions[faces, :1]
     )
 
 
 def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> Floats:
-    """(n, k, 3) differences of barycentric coordinates of vectors in face layouts, k to each face."""
+    """(n, k, 3) differences of barycentric coordinates that stand for (n, k) vectors in the layouts of (n,) faces."""
     q = triangles.corner_positions[faces]
     u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
     area = (np.conj(u) * v).imag
@@ -119,7 +128,10 @@ def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) ->
 def transfer_segments(
     source: CurveSegments, refinement: ConformingRefinement, history: History, before: IntrinsicMesh
 ) -> CurveSegments:
-    """Transfer a source from the triangles `before` the refinement to the triangles at the end of the history."""
+    """Transfer segments from the triangles `before` the refinement to those at the end of the history.
+
+    They are cut where they cross edges of these.
+    """
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
     spots = history.forward(*_snapped(*refinement.push_forward(source.nodes.faces, source.nodes.barycentric, none)))
@@ -172,7 +184,11 @@ def transfer_segments(
 
 
 def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners: Ints, nodes: Ints) -> Ints:
-    """(r, 2) ends of the pieces (r,) of segments (s, 2): each begins where the last one ended, or at a node."""
+    """(r, 2) ids of the end points of r pieces of segments: each begins where the previous one ended, or at a node.
+
+    `points` are the nodes of the segments, then the traced ends of all pieces, then their starts. Pieces have (r,)
+    faces and segments `owners`; `nodes` are the (s, 2) ends of segments.
+    """
     n = len(points) - 2 * len(faces)
     last = np.append(np.diff(owners) > 0, True)
     first = np.append(True, last[:-1])
@@ -186,7 +202,10 @@ def _joined(triangles: IntrinsicMesh, points: LocatedPoints, faces: Ints, owners
 
 
 def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Floats, Floats, Complexes]:
-    """Return the face of every segment, the larger at an edge, its barycentric ends, and its normal in the layout."""
+    """Place the s segments of a source in faces, the larger one for those along an edge.
+
+    Return (s,) faces, (s, 3) barycentric coordinates of both ends, and (s,) normals in the layouts of the faces.
+    """
     faces = source.faces.copy()
     on_edge = np.flatnonzero(source.edges >= 0)
     flat = triangles.edges.face_edges.ravel()
@@ -203,7 +222,10 @@ def in_faces(triangles: IntrinsicMesh, source: CurveSegments) -> tuple[Ints, Flo
 
 
 def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
-    """Move points within rounding error of an edge onto it, and turn vectors within rounding error along it."""
+    """Move points within rounding error of an edge onto it, and make their first vector parallel to it if it nearly is.
+
+    Arguments and results are as in `ConformingRefinement.push_forward`.
+    """
     near = barycentric < ZERO_COORDINATE
     weights = np.where(near, 0.0, barycentric)
     weights /= weights.sum(axis=1, keepdims=True)
@@ -214,14 +236,14 @@ def _snapped(faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, F
 
 
 ZERO_VALUE = 1e-12
-"""Size of values, relative to the largest, below which they count as zero."""
+"""Values below this, relative to the largest, count as zero."""
 
 
 def level_lines(history: History, refinement: ConformingRefinement, values: Floats) -> list[tuple[Ints, Floats, bool]]:
     """Trace, on the triangles before a history, the zero set of a function that is linear on those after it.
 
-    They must be consistently oriented. Returns faces and barycentric coordinates of each polyline, with larger values
-    to its left, and whether it is closed.
+    The triangles must be consistently oriented. Return for each polyline (n,) faces and (n, 3) barycentric coordinates
+    of its points, with larger values to its left, and whether it is closed.
     """
     least = ZERO_VALUE * max(float(np.nanmax(np.abs(values), initial=0.0)), 1e-300)
     line = zero_line(history.after, cleared(history.after, values, least))

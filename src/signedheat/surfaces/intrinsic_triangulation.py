@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     import pyvista
 
 LARGEST_ANGLE = 30.0
-"""Degrees; for larger minimum angles refinement need not terminate."""
+"""Largest minimum angle that may be asked for, in degrees; for larger ones refinement need not terminate."""
 GENERIC_DIRECTION = (np.pi / 4) ** np.arange(3)
 """Direction along which no two points with algebraic coordinates have the same height."""
 
@@ -117,7 +117,7 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
 
     @cached_property
     def vertex_places(self) -> tuple[Ints, Floats]:
-        """(n,) face of the mesh in which every vertex lies, −1 where unused, and (n, 3) barycentric coordinates there.
+        """(n,) face of the mesh in which each vertex lies, −1 if unused, and (n, 3) barycentric coordinates in it.
 
         Barycentric coordinates are the weights, with sum 1, of the corners of a face.
         """
@@ -270,13 +270,16 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[ids]]), rises)
 
     def _existing(self, faces: ArrayLike) -> Ints:
-        """(p,) ids of faces of the mesh as integers; ids that do not exist are refused."""
+        """(p,) ids of faces of the mesh as integers; raise `SourceError` if one does not exist."""
         ids = whole_numbers(faces, "faces")
         refuse_missing("face", ids, self.mesh.n_faces)
         return ids
 
     def _forward(self, faces: Ints, barycentric: Floats, vectors: Floats) -> tuple[Ints, Floats, Floats]:
-        """Transfer points of the mesh, and vectors (p, k, 3) at them, to the triangulation."""
+        """Transfer points of the mesh, and (p, k, 3) vectors at them, to the triangulation.
+
+        Points are (p,) faces and (p, 3) barycentric coordinates, vectors differences of such. The same is returned.
+        """
         faces, barycentric, vectors = self.refinement.push_forward(faces, barycentric, vectors)
         faces, barycentric, vectors = self.history.forward(faces, np.maximum(barycentric, 0.0), vectors)
         return faces, barycentric / barycentric.sum(axis=1, keepdims=True), vectors
@@ -284,20 +287,20 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
         """Find a level set of a function that is linear on these triangles, as curves on the mesh.
 
-        Larger values are to its left; values equal to the level count as larger. On inconsistently oriented meshes
-        it is that of the values at the vertices of the mesh.
+        Greater values are to the left of curves; values equal to the level count as greater. On meshes that are not
+        consistently oriented, only the values at the vertices of the mesh are used.
 
         Parameters
         ----------
         values : (n_vertices,) float
             The function at the vertices of the triangulation.
         level : float
-            Its value on the curves.
+            The level, in the units of the function.
 
         Returns
         -------
         list of Curve
-            On the mesh.
+            Curves on the mesh, one for each connected component.
 
         Raises
         ------
@@ -331,7 +334,7 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         edges : (s,) int
             The edge that each straight part belongs to.
         starts, ends : (s, 3) float
-            Where the part starts and ends in space.
+            Positions in space where the parts start and end, in the units of the mesh.
 
         See Also
         --------
@@ -362,7 +365,7 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         Parameters
         ----------
         source : Curve, SurfacePoints, CurveSegments, or sequence of them
-            On the mesh. Or lists of (element, coordinates), as for `signed_distance`.
+            Curves or points on the mesh. Or lists of (element, coordinates), as for `signed_distance`.
 
         Returns
         -------
@@ -414,13 +417,13 @@ class IntrinsicInterpolant:
     values: Floats  # at its vertices
 
     def __call__(self, points: object) -> Floats:
-        """Return (...) values at points that `placed` takes."""
+        """Return (...) values at the points of a curve, `SurfacePoints`, or (..., 3) positions."""
         faces, weights, shape = placed(self.triangulation.mesh, points)
         faces, weights = self.triangulation.locate(faces, weights)
         return shaped(np.einsum("ik,ik->i", weights, self.values[self.triangulation.faces[faces]]), shape)
 
     def gradient(self, points: object) -> Floats:
-        """(..., 3) gradients in space."""
+        """(..., 3) gradients in space at such points."""
         faces, weights, shape = placed(self.triangulation.mesh, points)
         return shaped(self.triangulation.gradient(self.values, faces, weights), shape)
 
@@ -448,9 +451,9 @@ def intrinsic_delaunay(
     mesh : TriangleMesh
         The surface.
     keep : Curve, SurfacePoints or a sequence of them
-        Curves that are to run along edges, and points that are to be vertices; of the points of curves those are where
-        lines bend, end or meet. Or lists of (element, barycentric coordinates), as for `signed_distance`. Curves
-        without length are left out if there are others. Other sources can be used as well.
+        Curves that are to run along edges, and points that are to be vertices. Points of curves become vertices where
+        curves bend, end or meet. Or lists of (element, barycentric coordinates), as for `signed_distance`. Curves
+        without length are left out if there are others. Distance can be measured to other sources as well.
     refine : bool
         Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
         at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly
@@ -461,17 +464,17 @@ def intrinsic_delaunay(
     max_vertices : int, optional
         Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
     coarsest : float
-        Largest circumradius that refinement leaves, in multiples of that of an equilateral triangle of the mean area
-        that there would be otherwise; at least 1. Flat parts of CAD meshes, which no small angle makes it split,
-        are then about as fine as the rest.
+        Triangles with a larger circumradius are split, too. It is relative to that of an equilateral triangle with the
+        mean area that there would be otherwise, and at least 1. Flat parts of CAD meshes, which have no small angles,
+        then become about as fine as the rest.
     progress : callable, optional
         Called as ``progress(fraction, step)``; an exception that it raises cancels.
 
     Returns
     -------
     IntrinsicTriangulation
-        A domain. Time and memory are proportional to the numbers of flips and new vertices, which on all but contrived
-        meshes are proportional to the size of the mesh.
+        The same surface in other triangles, a domain for distance. Time and memory are proportional to the numbers of
+        flips and new vertices, which on all but contrived meshes are proportional to the size of the mesh.
 
     Raises
     ------
@@ -532,7 +535,7 @@ def intrinsic_delaunay(
 
 
 def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
-    """Refuse faces so thin that rounded edge lengths do not determine their area."""
+    """Raise `GeometryError` if faces are so thin that the triangles, known by edge lengths, have another area."""
     before, after = float(mesh.face_areas.sum()), float(triangles.face_areas.sum())
     longest, most = float(triangles.lengths_of_edges.max(initial=0.0)), float(mesh.edge_lengths.sum())
     # where some faces are degenerate, the area changes by 1e-7 at most
@@ -548,7 +551,7 @@ def refuse_other_area(mesh: TriangleMesh, triangles: IntrinsicMesh) -> None:
 
 
 def triangle_mesh(domain: object) -> TriangleMesh:
-    """Return the domain if it is a triangle mesh; refuse others, which have no intrinsic triangulation."""
+    """Return the domain, converted if it is from another package, if it is a triangle mesh; raise otherwise."""
     domain = converted(domain)
     if not isinstance(domain, TriangleMesh):
         raise GeometryError(

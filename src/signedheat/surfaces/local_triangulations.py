@@ -8,7 +8,7 @@ result is a mesh with at most two faces at every edge.
 The two sides of a thin plate lie in the same tangent planes, and only normals keep them apart. So the distance of
 neighbours increases with the angle between normals, and neighbours are projected along the mean of both normals, so
 that the two faces at a sharp edge lie next to each other. First, points triangulate the neighbours on their own side.
-Where that leaves a boundary, they are joined to boundary points of the other side, as seen along the directions in
+Where that leaves a boundary, they are joined to boundary points of the other side, projected along the directions in
 which both sides end.
 """
 
@@ -34,21 +34,21 @@ from ..search.nearest_triangles import TriangleTree
 from .plane_fits import POINT_NEIGHBORS, point_spacing
 
 NORMAL_DISTANCE = 2.0
-"""Spacings by which neighbours count as farther (by Pythagoras) per unit of distance between their normals and the
-point's: four on the other side of a plate. 72 thin clouds have 2,750 edges at holes, with 1 4,400, with 3 2,030; but
-with 3, 6 of 12 balls of 200 random points have a hole, with 2 none."""
+"""Weight of the distance between unit normals in the distance of neighbours, in spacings: points on the other side of a
+plate, whose normals are 2 apart, count as four spacings farther (by Pythagoras). With it 72 thin clouds have 2,750
+edges at holes, with 1 4,400, with 3 2,030; but with 3, 6 of 12 balls of 200 random points have a hole, with 2 none."""
 OPPOSITE_SIDES = -0.5
-"""Cosine between the normals of two places below which they lie on different sides of a plate or wall. With -0.8 and
+"""Two points lie on different sides of a plate or wall if the cosine between their normals is below this. With -0.8 and
 0 there are 4 and 8 % more edges at holes of point clouds."""
 SAME_SIDE_HEIGHT = 0.03
-"""Height over a point's tangent plane, in spacings, up to which another point lies on the same side, whatever its
+"""Up to this height over the tangent plane of a point, in spacings, another point lies on the same side, whatever its
 normal. With 0.01 there are 3 % fewer edges at holes, with 0.1 51 % more."""
 OWN_NORMAL_WEIGHT = 0.03
-"""Weight of a point's own normal in its tangent plane, relative to that of its neighbours: it decides where these lie
-along a line, as on the narrow side of a plate. With 0.01 there are 44 % more edges at holes; with 0.1 6 % fewer, but 3
-of 12 balls of 200 random points have a hole."""
+"""Weight of a point's own normal in its tangent plane, relative to that of its neighbours. It decides where neighbours
+lie along a line, as on the narrow side of a plate. With 0.01 there are 44 % more edges at holes; with 0.1 6 % fewer,
+but 3 of 12 balls of 200 random points have a hole."""
 PROPOSED_AT_ONCE = 65536
-"""Number of points that propose triangles at once."""
+"""Batch size of points that propose triangles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,10 @@ class LocalTriangulations:
 def local_triangulations(
     points: Floats, normals: Floats, n_neighbors: int = 30, given: Floats | None = None
 ) -> LocalTriangulations:
-    """Triangulate points (n, 3) with normals, oriented like most of those `given`, in O(n log n) time."""
+    """Triangulate (n, 3) points in O(n log n) time, given (n, 3) unit normals by which sides are told apart.
+
+    Each component of the result is oriented like most of the normals `given`, or of `normals` without these.
+    """
     planes = TangentPlanes.of(points, normals, n_neighbors)
     faces, candidates = joined_triangles(planes)
     alone = islands(planes, faces)
@@ -78,7 +81,10 @@ def local_triangulations(
 
 
 def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
-    """Triangulate the points of each side, and join the sides where they end; return also all proposed triangles."""
+    """Triangulate the points of each side, and join the sides where they end.
+
+    Return (m, 3) accepted faces, and all well-shaped proposals.
+    """
     points, everywhere = planes.points, np.arange(len(planes.points))
     beside = ~planes.opposed(everywhere, planes.neighbors)
     proposals = [proposed_triangles(planes, everywhere, planes.neighbors, beside)]
@@ -96,7 +102,7 @@ def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
 
 
 def islands(planes: TangentPlanes, faces: Ints) -> Bools:
-    """(n,) whether a point is in a component smaller than a neighbourhood, and next to points of another side."""
+    """(n,) whether each point is in a component smaller than a neighbourhood, next to points of another side."""
     n, k = planes.neighbors.shape
     tail, head = edge_table(faces).vertices.T
     part = connected_components(n, tail, head)
@@ -122,7 +128,7 @@ class TangentPlanes:
 
     @classmethod
     def of(cls, points: Floats, normals: Floats, n_neighbors: int) -> TangentPlanes:
-        """Fit planes to the neighbours on the same side, since the normals of scans often belong to another mesh."""
+        """Fit a plane at each point to its neighbours on the same side; given normals of scans are often inexact."""
         k, many = (min(size, len(points) - 1) for size in (n_neighbors, 2 * n_neighbors))
         nearest = min(POINT_NEIGHBORS, many)
         tree = PointTree(points)
@@ -147,38 +153,40 @@ class TangentPlanes:
         return cls(points, axis, axes[:, :2], outward, neighbors, reach, flat)
 
     def opposed(self, here: Ints, there: Ints) -> Bools:
-        """(m, k) whether the points `there` (m, k) lie on the other side of a plate than the points `here` (m,)."""
+        """(m, k) whether the (m, k) points `there` lie on the other side of a plate than the (m,) points `here`."""
 
-        def found(ids: Ints) -> tuple[Bools]:
+        def opposed_to_first(ids: Ints) -> tuple[Bools]:
             return (opposed_normals(self.points, self.normals, self.flat[ids[:, 0]], ids)[:, 1:],)
 
-        return in_chunks(found, np.column_stack([here, there]))[0]
+        return in_chunks(opposed_to_first, np.column_stack([here, there]))[0]
 
     def unfolded(self, here: Ints, there: Ints) -> Floats:
-        """(m, 2) coordinates of points `there` (m,) in the tangent planes of points `here` (m,), laid flat.
+        """(m, 2) coordinates of points `there`, (m,) ids, in the tangent planes of points `here`, (m,) ids.
 
-        The height of a point along the mean of both normals is taken away, and the rest rotated into the plane.
-        For points on the other side of a plate, the directions in which both sides end replace the normals.
+        The height of a point along the mean of both normals is removed, and the rest rotated into the plane. For points
+        on the other side of a plate, the directions in which both sides end replace the normals.
         """
         known = self.points, self.normals, self.axes, self.outward, self.flat
         return in_chunks(lambda pairs: (_unfolded(*known, pairs),), np.column_stack([here, there]))[0]
 
     def unfolded_sides(self, triangles: Ints) -> Iterator[tuple[Floats, Floats]]:
-        """Yield, for each corner, the vectors (m, 2) to the next one and to the one after, in the corner's plane."""
+        """Yield, for each corner of (m, 3) triangles, (m, 2) vectors to both other corners in the corner's plane."""
         for k in range(3):
             corners, right, left = (triangles[:, (k + shift) % 3] for shift in range(3))
             yield self.unfolded(corners, right), self.unfolded(corners, left)
 
 
 ALIKE, MISTAKEN, OPPOSED = 0, 1, 2
-"""How the normals of two points differ: hardly; because one is inverted by mistake; as on two sides of a plate."""
+"""How the normals of two points differ: by less than 120°; because one is inverted by mistake; or as on the two sides
+of a plate."""
 
 
 @compiled
 def _difference(points: Floats, normals: Floats, flat: float, p: int, q: int) -> int:
-    """Tell how the normals of points p and q differ.
+    """Return `ALIKE`, `MISTAKEN` or `OPPOSED`, for the normals of points p and q.
 
-    Contrary normals are a mistake if q lies in the tangent plane of p, to a height, or if only one is above the other.
+    Contrary normals are a mistake if q lies within `flat` of the tangent plane of p, or if only one of the points is
+    above the other.
     """
     cosine, over, under = 0.0, 0.0, 0.0
     for d in range(3):
@@ -193,7 +201,10 @@ def _difference(points: Floats, normals: Floats, flat: float, p: int, q: int) ->
 
 @compiled
 def _normals_apart(points: Floats, normals: Floats, flat: Floats, ids: Ints) -> tuple[Floats, Bools]:
-    """(m, k) distances of normals from those of the first of each row of ids, mistakes mended; and the opposed ones."""
+    """(m, k) distances of normals from that of the first point in each row of ids, and (m, k) whether opposed to it.
+
+    Normals that are inverted by mistake are inverted before. `flat` are (m,) heights, see `_difference`.
+    """
     apart, opposed = np.empty(ids.shape), np.empty(ids.shape, dtype=np.bool_)
     for row in range(len(ids)):
         p = ids[row, 0]
@@ -208,15 +219,18 @@ def _normals_apart(points: Floats, normals: Floats, flat: Floats, ids: Ints) -> 
 
 
 def opposed_normals(points: Floats, normals: Floats, flat: Floats, ids: Ints) -> Bools:
-    """(m, k) which points lie on the other side of a plate than the first of each row, with heights (m,) of planes."""
+    """(m, k) which points lie on the other side of a plate than the first of their row of (m, k) ids.
+
+    `flat` are the (m,) heights up to which a point lies in the tangent plane of the first.
+    """
     return _normals_apart(points, normals, flat, ids)[1]
 
 
 @compiled
 def _unfolded(points: Floats, normals: Floats, axes: Floats, outward: Floats, flat: Floats, pairs: Ints) -> Floats:
-    """For each pair (m, 2) of points, lay the second into the tangent plane of the first: `TangentPlanes.unfolded`.
+    """(m, 2) coordinates of the second point of each pair in the tangent plane of the first: `TangentPlanes.unfolded`.
 
-    Returns its coordinates (m, 2) along the two axes of the plane.
+    `pairs` are (m, 2) ids; the other arguments are attributes of `TangentPlanes`.
     """
     result, middle, seen = np.empty((len(pairs), 2)), np.empty(3), np.empty(3)
     for row in range(len(pairs)):
@@ -243,7 +257,10 @@ def _unfolded(points: Floats, normals: Floats, axes: Floats, outward: Floats, fl
 
 
 def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Floats) -> Floats:
-    """(n, 3, 3) principal axes of (n, k, 3) offsets with (n, k) weights; the last is pulled towards normals (n, 3)."""
+    """(n, 3, 3) principal axes of (n, k, 3) offsets with (n, k) weights, from the longest extent to the shortest.
+
+    The last axis is pulled towards the (n, 3) normals. `reach` are the (n,) distances of the farthest offsets.
+    """
     weights = weights[..., None]
     offsets = offsets - (weights * offsets).sum(axis=1, keepdims=True) / weights.sum(axis=1, keepdims=True)
     covariance = (weights * offsets).transpose(0, 2, 1) @ offsets
@@ -254,15 +271,18 @@ def principal_axes(offsets: Floats, weights: Floats, normals: Floats, reach: Flo
 
 
 def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, allowed: Bools) -> tuple[Ints, Ints]:
-    """(m, 3) distinct triangles that `centers` (c,) propose with `allowed` neighbours (c, k), and (m,) their votes."""
+    """(m, 3) distinct triangles that (c,) `centers` propose around themselves, and (m,) how many propose each.
+
+    They use the neighbours, (c, k), that are `allowed`, (c, k).
+    """
     triangles = [np.empty((0, 3), dtype=np.int64)]
     k = neighbors.shape[1]
     for begin in range(0, len(centers), PROPOSED_AT_ONCE):
         part = slice(begin, begin + PROPOSED_AT_ONCE)
         chunk = centers[part]
-        places = planes.unfolded(np.repeat(chunk, k), neighbors[part].ravel()).reshape(len(chunk), k, 2)
+        coordinates = planes.unfolded(np.repeat(chunk, k), neighbors[part].ravel()).reshape(len(chunk), k, 2)
         # neighbours not allowed are moved to the origin, where voronoi_fans skips them
-        x, y = np.moveaxis(places * allowed[part, :, None], 2, 0)
+        x, y = np.moveaxis(coordinates * allowed[part, :, None], 2, 0)
         order = np.argsort(x * x + y * y, axis=1)
         x, y = np.take_along_axis(x, order, axis=1), np.take_along_axis(y, order, axis=1)
         # places in `order` of the neighbours around each point; −1 where no neighbour bounds its cell
@@ -283,7 +303,11 @@ def proposed_triangles(planes: TangentPlanes, centers: Ints, neighbors: Ints, al
 
 
 def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, Ints]]) -> Ints:
-    """Well-shaped triangles that overlap no better one: of earlier proposals, then of more votes, then rounder."""
+    """(m, 3) well-shaped triangles that do not overlap a better one.
+
+    `proposals` are pairs of triangles and their votes. Better are those of earlier pairs, then those with more votes,
+    then rounder ones.
+    """
     triangles = np.concatenate([part for part, _ in proposals])
     votes = np.concatenate([part for _, part in proposals])
     rank = np.repeat(np.arange(len(proposals)), [len(part) for part, _ in proposals])
@@ -294,7 +318,7 @@ def accepted_triangles(planes: TangentPlanes, proposals: Sequence[tuple[Ints, In
 
 
 def well_shaped_triangles(points: Floats, triangles: Ints, reach: Floats) -> tuple[Ints, Floats]:
-    """Ids of triangles with positive area and a circumradius within the reach of all corners, and these circumradii."""
+    """(k,) ids of triangles with an area and a circumradius within the (n,) reach of all corners; (k,) circumradii."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     u, v, w = b - a, c - b, a - c
     twice_area = np.linalg.norm(np.cross(u, w), axis=1)
@@ -305,7 +329,7 @@ def well_shaped_triangles(points: Floats, triangles: Ints, reach: Floats) -> tup
 
 
 def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
-    """Accept triangles, in order, unless they overlap an earlier one: in the tangent plane of a common corner."""
+    """(k, 3) triangles that are accepted, in order, unless they overlap an earlier one around a common corner."""
     starts, widths = np.empty(triangles.shape), np.empty(triangles.shape)
     for k, sides in enumerate(planes.unfolded_sides(triangles)):
         right, left = (np.arctan2(side[:, 1], side[:, 0]) for side in sides)
@@ -315,7 +339,10 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
 
 
 def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
-    """Split the triangle nearest to each point whose candidates all overlap others; points without any are outliers."""
+    """Return faces in which each point of a candidate is a vertex: the nearest face to each that is not is split.
+
+    Points without candidates are outliers.
+    """
     while len(left := np.setdiff1d(candidates, faces)):
         nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])
         split, first = np.unique(nearest, return_index=True)
@@ -326,21 +353,21 @@ def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
 
 
 def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
-    """(n,) signs that orient `axes` alike across edges and like `normals`, and each component like `given`."""
+    """(n,) signs that orient (n, 3) axes consistently across edges and like `normals`, and components like `given`."""
     n = len(axes)
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
     across = (axes[tail] * axes[head]).sum(axis=1)
     links = Links(tail, head, across * np.abs(across))  # creases weigh little
     own = (axes * normals).sum(axis=1)  # estimates, node n, weigh as much as a neighbour in the same plane
-    found = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
-    signs = (found[:n] * found[n]).astype(np.int64)
+    node_signs = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
+    signs = (node_signs[:n] * node_signs[n]).astype(np.int64)
     preference = np.bincount(parts, signs * (axes * given).sum(axis=1))
     return np.where(preference < 0, -1, 1)[parts] * signs
 
 
 def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
-    """Turn faces to be counter-clockwise, in the planes of their corners, as seen from where the normals point."""
+    """(m, 3) faces, flipped so that they face to where the normals at their corners point, in tangent planes there."""
     up = np.sign((np.cross(planes.axes[:, 0], planes.axes[:, 1]) * normals).sum(axis=1))
     area = np.zeros(len(faces))
     for k, (a, b) in enumerate(planes.unfolded_sides(faces)):
@@ -351,15 +378,15 @@ def facing(planes: TangentPlanes, normals: Floats, faces: Ints) -> Ints:
 CELL_ROOM = 64
 """Largest number of sides of a Voronoi cell, and of triangles at a point."""
 SECTOR_OVERLAP = 1e-7
-"""Radians by which the sectors of two triangles at a corner may overlap."""
+"""The sectors of two triangles at a corner may overlap by this angle, in radians."""
 
 
 @compiled
 def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
-    """(n, CELL_ROOM) Delaunay neighbours of the origin among places (n, k, 2), counter-clockwise; (n,) counts.
+    """Find the Delaunay neighbours of the origin among (n, k, 2) points, n times, which must be sorted by distance.
 
-    The Voronoi cell, at first a square from −1 to 1, is cut by the bisectors of neighbours, nearest first. Sides of the
-    square that remain are −1, and count.
+    Return (n, CELL_ROOM) indices, counter-clockwise, and their (n,) numbers. The Voronoi cell of the origin, at first a
+    square from −1 to 1, is cut by the bisectors of neighbours. Sides of the square that remain are listed as −1.
     """
     n, k = places.shape[:2]
     neighbours = np.full((n, CELL_ROOM), -1, dtype=np.int64)
@@ -412,7 +439,10 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
 
 @compiled
 def accept_apart(triangles: Ints, starts: Floats, widths: Floats, n_points: int) -> Bools:
-    """(m,) whether the sectors of a triangle, from starts (m, 3) on by widths (m, 3), overlap none accepted earlier."""
+    """(m,) whether each triangle is accepted, since its sectors at its corners overlap none accepted before.
+
+    Sectors are (m, 3) angles from `starts` on, `widths` wide.
+    """
     accepted = np.zeros(len(triangles), dtype=np.bool_)
     sectors = np.zeros((n_points, CELL_ROOM, 2))
     count = np.zeros(n_points, dtype=np.int64)
@@ -442,7 +472,7 @@ HOLE_SIDES = 12
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """Triangulate holes of at most `HOLE_SIDES` sides, without diagonals that are already edges."""
+    """(k, 3) triangles that fill holes of at most `HOLE_SIDES` sides, without diagonals that are already edges."""
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
@@ -460,7 +490,10 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
 
 
 def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -> Ints:
-    """(b,) boundary edge that follows each one around the gap to its right, the first counter-clockwise, or −1."""
+    """(b,) the boundary edge that follows each around the gap to its right, or −1.
+
+    Edges have (b,) tails and heads. Of several, it is the first counter-clockwise as seen from the normal.
+    """
     arriving, onward = members_of(*grouped(tails, len(points)), heads)
     vertices = heads[arriving]
     back, forth = points[tails[arriving]] - points[vertices], points[heads[onward]] - points[vertices]
@@ -487,7 +520,10 @@ def _loop_from(start: int, following: Ints) -> list[int]:
 
 
 def _filling(points: Floats, normals: Floats, loop: list[int], existing: set[tuple[int, int]]) -> list[list[int]]:
-    """Triangles that fill a loop of vertices, counter-clockwise around a hole; their edges are added to `existing`."""
+    """Triangulate a hole, whose vertices are listed counter-clockwise; return no triangles if that is not possible.
+
+    Its diagonals must not be among the `existing` edges, to which they are added.
+    """
     if len(set(loop)) < max(len(loop), 3):
         return []
     corners = points[loop]
@@ -496,10 +532,10 @@ def _filling(points: Floats, normals: Floats, loop: list[int], existing: set[tup
     if fan @ normal <= 0:
         return []
     axes = np.concatenate(axes_across(normal[None]))
-    made = triangulate_polygon((corners - corners[0]) @ axes.T, len(loop))
-    if made is None:
+    cut = triangulate_polygon((corners - corners[0]) @ axes.T, len(loop))
+    if cut is None:
         return []
-    triangles: list[list[int]] = np.array(loop)[made].tolist()
+    triangles: list[list[int]] = np.array(loop)[cut].tolist()
     sides = {_pair(loop[k - 1], loop[k]) for k in range(len(loop))}
     diagonals = {_pair(row[k - 1], row[k]) for row in triangles for k in range(3)} - sides
     if diagonals & existing:
@@ -509,4 +545,5 @@ def _filling(points: Floats, normals: Floats, loop: list[int], existing: set[tup
 
 
 def _pair(i: int, j: int) -> tuple[int, int]:
+    """Return two vertex ids in ascending order, as the key of an edge."""
     return min(i, j), max(i, j)

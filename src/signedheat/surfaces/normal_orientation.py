@@ -6,7 +6,7 @@ alike, without a triangulated surface. Faces of the convex hull link them with t
 Amenta & Bern 1999; labels from balls that overlap: Kolluri, Shewchuk & O'Brien 2004.)
 
 Gauss's formula (`signedheat.solids.gauss`) needs an inside, which clouds need not have: on points of open sheets
-(waves, terrains, saddles) it turns half of the normals, where these links turn none.
+(waves, terrains, saddles) it gets half of the normals wrong, where these links get none wrong.
 """
 
 from __future__ import annotations
@@ -26,45 +26,51 @@ from .local_triangulations import SAME_SIDE_HEIGHT, opposed_normals
 from .plane_fits import POINT_NEIGHBORS, PlaneFits, fit_planes, noise_scale, noisy_sizes, point_spacing
 
 KEPT_SPACING = 0.35
-"""Least distance between the noisy points that are kept, in reaches: larger than the noise that planes leave."""
+"""Noisy points are thinned to at least this distance, relative to their reach; the noise that planes leave is less."""
 MOST_TET_POINTS = 100_000
-"""Largest number of points for which tets are made; the others take the signs of their neighbours."""
+"""Largest number of points for which tets are made; the others get the signs of their neighbours."""
 WEAK_WEIGHT = 0.1
-"""Weight of what tells sides less surely than balls do: of a link between neighbours, relative to that of a ball (with
-noisy points they weigh the same), and of given signs, relative to half the typical sum of all links of a point."""
+"""Weight of evidence that is weaker than balls. It is the weight of links between neighbours, relative to that of balls
+(for noisy points both weigh the same); and that of given signs, relative to half the typical sum of all links of a
+point."""
 MOST_WRONG = 3.0
-"""Given signs stay unless the share that seems wrong exceeds this many times the share of contradictions."""
+"""Given signs are kept unless the share that seems wrong exceeds this many times the share of contradictions."""
 COHERENCE_GAIN = 0.0015
-"""Gain of coherence for which larger neighbourhoods are taken, and loss at which no larger ones are tried."""
+"""Larger neighbourhoods are preferred if they gain this much coherence. Once it falls by as much, no larger ones are
+tried."""
 JOGGLE = 1e-4
 """Random shift of points, relative to their reach, since flat faces and lattices are slow to triangulate."""
 BALL_COSINE = 0.5
-"""Cosine between a normal and the direction to a ball's centre below which a ball links no signs."""
+"""A ball links the sign of a point only if the cosine between its normal and the direction to the ball's centre is
+above this."""
 OUTLIER_DISTANCE = 4.0
-"""Distance from a point to its neighbours, relative to that from these to theirs, above which it is an outlier. It is
-up to 1.4 where spacing is even, and 1.6 where density halves within three spacings."""
+"""A point is an outlier if it is this many times as far from its neighbours as these are from theirs. The factor is up
+to 1.4 where spacing is even, and 1.6 where density halves within three spacings."""
 UPWARD = np.array([0.01, 0.1, 1.0])
 """Outward direction where nothing decides it, as for points in a plane: up, and on vertical planes along the second
 axis. If a component is halved or doubled, planes keep their sides."""
 MUTUALLY_BELOW = 0.98
-"""Given normals are kept on thin sheets if, of all near points with opposite normals, the shares below and above the
-other point differ by at least this. On thin sheets the difference is 1, and 0.9 if a fifth of the normals are turned.
-"""
+"""Given normals are kept on thin sheets if, among near points with opposite normals, the share that lies below the
+other point and the share above it differ by at least this. On thin sheets the difference is 1, and 0.9 if a fifth of
+the normals are flipped."""
 LISTED_AT_ONCE = 4096
-"""Number of points whose neighbours are listed at once."""
+"""Batch size of points whose neighbours are listed."""
 
 
 @dataclass(frozen=True, eq=False)
 class OutwardSigns:
-    """Signs that turn axes outwards."""
+    """Signs by which axes are multiplied so that they point outwards."""
 
     signs: Floats  # (n,) 1 or −1
-    sided: bool  # whether some link decides which side is out
+    sided: bool  # whether some link decides which side is outside
     coherence: float  # share of the weights of links that the signs agree with, less the share that they contradict
 
 
 def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats, PlaneFits, OutwardSigns]:
-    """Orient normals at (n, 3) distinct points outwards: the given ones, some of which are inverted, or fitted ones."""
+    """Orient normals at (n, 3) distinct points outwards: the (n, 3) given ones, or else fitted ones.
+
+    Return (n, 3) unit normals, the fitted planes, and the signs by which given or fitted normals were multiplied.
+    """
     if given is None:
         fits, outward = fitted_outward(points)
         return fits.axes * outward.signs[:, None], fits, outward
@@ -75,9 +81,10 @@ def outward_normals(points: Floats, given: Floats | None = None) -> tuple[Floats
 
 
 def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
-    """Keep the signs of given normals (n, 3) on sheets thinner than the spacing, where balls are no evidence.
+    """(n,) signs in which those on sheets thinner than the spacing, where balls are no evidence, are all the same.
 
-    They are kept if, all over the cloud, near points with opposite normals are each below the other, or each above.
+    So the (n, 3) given normals are kept there, or all inverted. This is done only if, all over the cloud, near points
+    with opposite normals are each below the other, or each above.
     """
     k = min(POINT_NEIGHBORS, len(points) - 1)
     distances, near = PointTree(points).query(points, k=k + 1)
@@ -93,7 +100,7 @@ def kept_on_thin_sheets(points: Floats, given: Floats, signs: Floats) -> Floats:
 
 
 def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
-    """Fit planes to neighbourhoods of the size at which signs contradict each other least; return these signs, too."""
+    """Fit planes to (n, 3) points, with as many neighbours as make signs most coherent; return planes and signs."""
     tried: list[tuple[PlaneFits, OutwardSigns]] = []
     for size in noisy_sizes(points) or (None,):
         fits = fit_planes(points, size)
@@ -105,7 +112,7 @@ def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
 
 
 def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> OutwardSigns:
-    """Find signs that turn axes (n, 3) outwards."""
+    """Find signs that orient (n, 3) axes outwards; if they were `given`, most of them may be right, and are kept."""
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
     chosen = spread_out(fits.places, KEPT_SPACING * fits.reaches) if fits.noisy else np.arange(n)
@@ -133,13 +140,16 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
 
 
 def _lone(places: Floats, reaches: Floats) -> Bools:
-    """(n,) whether a point is an outlier, much farther from its neighbours than these are from theirs."""
+    """(n,) whether each point is an outlier, much farther from its neighbours than these are from theirs.
+
+    `reaches` are the (n,) distances of points to their neighbours.
+    """
     near = PointTree(places).query(places, k=min(POINT_NEIGHBORS + 1, len(places)))[1]
     return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
 
 
 def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
-    """(k,) signs that make the axes at `others` (k, 3) agree with the normals around them."""
+    """(k,) signs that make the (k, 3) axes at `others`, (k, 3), agree with the (n, 3) normals at the nearest places."""
     distances, near = PointTree(places).query(others, k=min(6, len(places)))
     distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
     weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
@@ -148,7 +158,10 @@ def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> 
 
 
 def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
-    """Link signs of axes (n, 3) by neighbours, balls and the hull (to the outside, node n); tell if there are balls."""
+    """Link the signs of (n, 3) axes by neighbours, by balls, and by the hull to the outside, which is node n.
+
+    Also return whether there are balls; without them, as for points in a plane, neighbours alone are linked.
+    """
     near = _neighbor_links(places, axes, 1.0 if noisy else WEAK_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
     try:
@@ -165,12 +178,12 @@ def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = Fals
 
 
 def _confidence(cosines: Floats) -> Floats:
-    """Signed fourth power of cosines, zero below `BALL_COSINE`."""
+    """Fourth powers of cosines, with their signs; 0 if they are below `BALL_COSINE` in absolute value."""
     return np.where(np.abs(cosines) > BALL_COSINE, np.sign(cosines) * cosines**4, 0.0)
 
 
 def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
-    """Link the signs at every two corners of a tet (t, 4) along whose axes its circumscribed ball lies."""
+    """Link the signs at every two corners of a tet along whose axes its circumscribed ball lies; tets are (t, 4)."""
     corners = places[tets]
     u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
@@ -191,7 +204,10 @@ def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
 
 
 def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
-    """Link corners of the hull with the outside, which faces away from the mean: tets behind faces may be flat."""
+    """Link the corners of the convex hull with the outside, node n, which is away from the mean of the points.
+
+    The tets behind faces of the hull cannot tell the side, since they may be flat.
+    """
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
     a, b, c = places[faces].transpose(1, 0, 2)
@@ -202,10 +218,10 @@ def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> L
 
 
 def neighbors_agree(points: Floats, normals: Floats) -> bool:
-    """Say whether nowhere among (n, 3) points the normals of neighbours contradict each other.
+    """Whether the (n, 3) normals of neighbours among (n, 3) points contradict each other nowhere.
 
-    Then whole components may face the wrong way, but no single points, for which balls would be needed. Normals that
-    point the same way never contradict each other, even where noise puts one point above the other.
+    Then whole components may face the wrong way, but not single points. Normals that point the same way never
+    contradict each other, even where noise puts one point above the other.
     """
     links = _neighbor_links(points, normals, 1.0)
     against = links.weights < 0
@@ -225,7 +241,7 @@ def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
 
 
 def spread_out(points: Floats, radii: Floats) -> Ints:
-    """Ids, ascending, of the points (n, d) that are kept: those not within the radius (n,) of any kept before them."""
+    """(k,) ids, ascending, of (n, d) points that are not within the radius, (n,), of a point that was kept before."""
     tree = PointTree(points)
     kept = np.ones(len(points), dtype=bool)
     for begin in range(0, len(points), LISTED_AT_ONCE):
@@ -239,7 +255,7 @@ def spread_out(points: Floats, radii: Floats) -> Ints:
 
 @compiled
 def _keep_first(ids: Ints, ends: Ints, near: Ints, kept: Bools) -> None:
-    """Unmark in `kept` the later neighbours ``near[ends[i]:ends[i + 1]]`` of each kept point ``ids[i]``."""
+    """Set `kept`, (n,), to False at later neighbours ``near[ends[i]:ends[i + 1]]`` of each kept point ``ids[i]``."""
     for i in range(len(ids)):
         if kept[ids[i]]:
             for k in range(ends[i], ends[i + 1]):

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
 
 CONTRARY_NORMALS = 0.35
-"""Share of the given normals, or of their inverses, that may contradict the orientation of the points. It is 0.39 to
-0.49 where both sides of a plate are taken for one, and 0.3 where 0.3 of the normals are turned."""
+"""If a larger share of the given normals, and of their inverses, contradicts the orientation of the points, there is a
+warning. It is 0.39 to 0.49 if both sides of a plate are merged, and 0.3 if 0.3 of the normals are flipped."""
 BAD_SEAM = 0.35
-"""Number of edges next to another side across which triangles face opposite ways, relative to the root of the number
-of points, above which there is a warning. On scans, CAD and a box with up to 0.15 spacings of noise it is at most 0.07,
-where parts of thin plates face the wrong way mostly 0.41 to 0.96."""
+"""There is a warning if the number of edges next to another side across which triangles face opposite ways, relative to
+the root of the number of points, exceeds this. On scans, CAD and a box with up to 0.15 spacings of noise it is at most
+0.07, where parts of thin plates face the wrong way mostly 0.41 to 0.96."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +47,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     points : (n, d) float
         Positions.
     normals : (n, d) float, optional
-        Directions pointing out of the shape; normalised here. A zero normal is an error.
+        Directions pointing out of the shape, of any length but 0; they are scaled to length 1.
     areas : (n,) float, optional
-        Surface area that each point represents. If absent, estimated from neighbours when needed.
+        Surface area that each point represents, in square units. If absent, estimated from neighbours when needed.
     n_neighbors : int
-        Size of the neighbourhoods in which tangent planes are fitted and triangles made, when distance is measured on
-        the cloud.
+        Number of nearest points to which tangent planes are fitted and with which triangles are made, when distance is
+        measured on the cloud.
 
     Raises
     ------
@@ -69,9 +69,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     Notes
     -----
     As a domain, a cloud needs no normals, and its normals need not be consistent. Normals and triangles are oriented
-    together, each connected component to the side to which most of its given normals point; without given normals
-    outward, and upward for points in a plane. The left of a curve is as seen from that side, unless the
-    curve has normals of its own. Points that coincide count once; points without a triangle, such as outliers, get NaN.
+    together, each connected component to the side to which most of its given normals point. Without given normals they
+    are oriented outwards, or upwards if points lie in a plane. The left of a curve is as seen from that side, unless
+    the curve has normals of its own. Points that coincide count once. Points without a triangle, such as outliers, get
+    NaN.
 
     Examples
     --------
@@ -143,7 +144,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def representatives(self) -> Ints:
-        """(n,) first point that coincides with each point, within a ten-millionth of the size of the cloud."""
+        """(n,) id of the first point that coincides with each, within a ten-millionth of the size of the cloud."""
         lower, upper = self.bounds
         cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
         cells = np.rint((self.points - lower) / cell)
@@ -151,7 +152,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def _distinct(self) -> tuple[Ints, LocalTriangulations]:
-        """Ids of the distinct points, sorted by coordinates, and their local triangulations."""
+        """(k,) ids of the distinct points, sorted by coordinates, and their local triangulations."""
         if self.points.shape[1] != 3:
             raise GeometryError(
                 f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}",
@@ -195,7 +196,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def triangulation(self) -> TriangleMesh:
-        """The triangles that curves refer to; of points that coincide, the first is the vertex."""
+        """The triangles that curves refer to; of points that coincide, only the first is a vertex of triangles."""
         ids, triangulated = self._distinct
         return TriangleMesh(self.points, ids[triangulated.faces])
 
@@ -217,7 +218,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
 
 def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
-    """Count edges next to another side across which triangles face opposite ways."""
+    """Return the number of edges across which triangles face opposite ways, and near which there is another side.
+
+    Points and unit normals are (n, 3), faces (m, 3).
+    """
     halfedges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
     edges, uses = np.unique(halfedges, axis=0, return_counts=True)
     twice = edges[uses > 1]
@@ -229,5 +233,6 @@ def edges_turned(points: Floats, normals: Floats, faces: Ints) -> int:
 
 
 def _same_length(values: Floats, points: Floats, name: str) -> None:
+    """Raise `GeometryError` unless there is one value for each point."""
     if len(values) != len(points):
         raise GeometryError(f"there are {counted(len(points), 'point')}, but {len(values)} {name}", element=name)

@@ -1,8 +1,8 @@
 """Polygon meshes: faces with any number of corners, which may be nonconvex and mildly nonplanar.
 
-They are refined virtually, into fans of triangles around a virtual vertex (Bunge, Herholz, Kazhdan & Botsch 2020). The
-vertex minimises the sum of the squared areas of these triangles. It is an affine combination of the corners, so that
-functions on the corners can be prolonged to the fan.
+Polygons are divided into fans of triangles around an added *virtual* vertex (Bunge, Herholz, Kazhdan & Botsch 2020). It
+minimises the sum of the squared areas of these triangles. It is an affine combination of the corners, so that functions
+on the corners can be extended to it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
     vertices : (n, 3) float
         Positions.
     polygons : sequence of sequences of int
-        Vertex ids of each polygon, three or more, counter-clockwise seen from where its normal points to.
+        Vertex ids of each polygon, three or more, counter-clockwise as seen from the side to which its normal points.
 
     Raises
     ------
@@ -139,17 +139,17 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @property
     def is_watertight(self) -> bool:
-        """Whether as many polygons run along every edge one way as the other: see `TriangleMesh.is_watertight`."""
+        """Whether each edge has exactly two polygons, in opposite directions: see `TriangleMesh.is_watertight`."""
         return self.triangulation.is_watertight
 
     @cached_property
     def corner_polygons(self) -> Ints:
-        """Polygon of each entry of `corners`."""
+        """(c,) polygon of each entry of `corners`."""
         return np.repeat(np.arange(self.n_polygons), np.diff(self.offsets))
 
     @cached_property
     def next_corners(self) -> Ints:
-        """Vertex that follows each entry of `corners` around its polygon."""
+        """(c,) vertex that follows each entry of `corners` around its polygon."""
         return self.corners[next_in_groups(self.offsets)]
 
     @cached_property
@@ -160,14 +160,14 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @cached_property
     def polygon_area_vectors(self) -> Floats:
-        """(p, 3) area times mean normal, in square units: depends on the boundary of a polygon only, planar or not."""
+        """(p, 3) area times mean normal, in square units, which depends on the boundary of a polygon only."""
         center = self.polygon_centroids[self.corner_polygons]
         a, b = self.vertices[self.corners] - center, self.vertices[self.next_corners] - center
         return 0.5 * np.add.reduceat(np.cross(a, b), self.offsets[:-1], axis=0)
 
     @cached_property
     def refinement(self) -> VirtualRefinement:
-        """The polygons as triangles, usually by a virtual vertex in each polygon with more than three corners."""
+        """The triangles of the polygons, usually around a virtual vertex in those with more than three corners."""
         return virtual_refinement(self.vertices, self.corners, self.offsets)
 
     @cached_property
@@ -188,8 +188,8 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
 
 TWICE_APART = 1e-9
-"""Corners that a polygon passes twice are moved inwards, relative to its size, while diagonals are found."""
-_SLIVER = 1e-6  # a fan triangle whose area is less than this fraction of its polygon's counts as turned over
+"""While diagonals are found, corners that a polygon passes twice are moved inwards by this, relative to its size."""
+_SLIVER = 1e-6  # a fan triangle is flipped over if its area is less than this fraction of its polygon's
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,7 +203,10 @@ class VirtualRefinement:
 
 
 def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> VirtualRefinement:
-    """Subdivide polygons into fans, or by diagonals where fan triangles turn over."""
+    """Subdivide polygons into fans, or by diagonals where fan triangles would be flipped over.
+
+    `corners`, (c,), are their vertex ids, polygon by polygon; polygon k begins at ``offsets[k]``.
+    """
     before = np.roll(corners, 1)
     before[offsets[:-1]] = corners[offsets[1:] - 1]
     differs = corners != before
@@ -256,9 +259,11 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
 def virtual_vertices(
     vertices: Floats, tails: Ints, heads: Ints, polygons: Ints, n_polygons: int
 ) -> tuple[Floats, Floats]:
-    """Find the points that minimise Σ |fan triangle|², and their affine weights of least norm.
+    """Find the (n_polygons, 3) points that minimise Σ |fan triangle|², and the (k,) affine weights of corners for them.
 
-    Twice the area vector of side ``a → b`` and apex x is ``a × b + (b − a) × x``: three equations for each polygon.
+    Sides of polygons have (k,) tails, heads and polygons; a weight is that of the tail. Of all weights, those of least
+    norm are chosen. Twice the area vector of side ``a → b`` and apex x is ``a × b + (b − a) × x``, which gives three
+    equations for each polygon.
     """
     count = np.bincount(polygons, minlength=n_polygons)
     mean = sums_of(vertices[tails], polygons, n_polygons) / count[:, None]
@@ -276,7 +281,10 @@ def virtual_vertices(
 
 
 def _cut(polygon: Floats) -> Ints:
-    """(k − 2, 3) triangles into which diagonals cut a polygon, which may pass an edge there and back; or (0, 3)."""
+    """(k − 2, 3) triangles into which diagonals cut a polygon of (k, 3) corners, or (0, 3) if it cannot be cut.
+
+    It may pass an edge in both directions.
+    """
     around = polygon - polygon.mean(axis=0)
     normal = np.cross(around, np.roll(around, -1, axis=0)).sum(axis=0)
     if not normal.any():
@@ -292,7 +300,10 @@ def _cut(polygon: Floats) -> Ints:
 
 
 def _solve_symmetric(matrices: Floats, loads: Floats) -> Floats:
-    """Nearly minimum-norm solutions of semidefinite systems: a flat polygon does not determine x along its normal."""
+    """(p, 3) nearly minimum-norm solutions of (p, 3, 3) semidefinite systems with (p, 3) right-hand sides.
+
+    The systems of flat polygons are singular along their normals.
+    """
     size = np.trace(matrices, axis1=1, axis2=2)
     held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
     return np.linalg.solve(held, loads[..., None])[..., 0].astype(np.float64, copy=False)

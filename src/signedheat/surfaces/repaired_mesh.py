@@ -1,4 +1,4 @@
-"""A triangle mesh without copies of faces and faces between two vertices, whose faces agree; and the way back."""
+"""Triangle meshes without duplicate faces and oriented consistently, for distance on them; and the way back."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ class MeshRepaired(Note):
 
 @dataclass(frozen=True, eq=False)
 class RepairedMesh:
-    """A mesh with its seams joined and without copies of faces, which agree with their neighbours where they can."""
+    """A mesh before and after its repair: seams joined, duplicate faces left out, and faces oriented consistently."""
 
     given: TriangleMesh  # the mesh before the repair
     mesh: Any  # the mesh after it, a `TriangleMesh` on some of the same vertices
-    places: Ints  # (n,) vertex of the repaired mesh at each one of the given mesh
+    places: Ints  # (n,) vertex of the repaired mesh for each vertex of the given mesh
     faces: Ints  # (m,) triangle of the repaired mesh for each one of the given mesh, on the same vertices
     corners: Ints  # (m, 3) corner of that triangle at each corner of the given one
     notes: tuple[Note, ...]  # what was done
 
     @classmethod
     def of(cls, given: object, agree: bool = True) -> RepairedMesh | None:
-        """Return a repaired triangle mesh; None if there is nothing to repair, or the shape given is none.
+        """Repair a triangle mesh; None if there is nothing to repair, or the shape is no triangle mesh.
 
-        Faces are turned only if they are to `agree`.
+        Faces are flipped only if they are to `agree` with their neighbours.
         """
         if not isinstance(given, TriangleMesh):
             return None
@@ -62,7 +62,7 @@ class RepairedMesh:
         return cls(given, TriangleMesh(given.vertices, faces), once.places, targets, to, notes)
 
     def on_it(self, source: Any) -> Any:
-        """Move a curve, points, or a sequence of them to the repaired mesh; what does not fit the given one stays."""
+        """Move a curve, points, or a sequence of them from the given mesh to the repaired one; others are returned."""
         if isinstance(source, Sequence) and not isinstance(source, str):
             return [self.on_it(part) for part in source]
         if not isinstance(source, Curve | SurfacePoints):
@@ -77,13 +77,13 @@ class RepairedMesh:
         return Curve(self.faces[faces], weights, source.closed, source.oriented, source.normals)
 
     def on_given(self, field: Field[Any]) -> Field[Any]:
-        """Return a field on the repaired mesh, at the vertices of the given one."""
+        """Return a field on the repaired mesh as one on the given mesh."""
         values = field.values[self.places]
         diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values))).noting(*self.notes)
         return Field(self.given, values, diagnostics)
 
     def curve_on_given(self, curve: Curve) -> Curve:
-        """Return a curve on the repaired mesh as one on the given mesh; of copies of a face, it is on the first."""
+        """Return a curve on the repaired mesh as one on the given mesh, on the first of duplicate faces."""
         faces = np.unique(self.faces, return_index=True)[1][curve.faces]
         weights = np.take_along_axis(curve.barycentric, self.corners[faces], axis=1)
         return Curve(faces, weights, curve.closed, curve.oriented, curve.normals)

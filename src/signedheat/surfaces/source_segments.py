@@ -1,4 +1,4 @@
-"""Curves and points as given, in groups, and as segments on an intrinsic mesh, each in one face or along one edge."""
+"""Curves and points on surfaces, as they are given, and cut into segments in one face or along one edge each."""
 
 from __future__ import annotations
 
@@ -37,16 +37,17 @@ from .triangle_mesh import TriangleMesh
 
 Positions: TypeAlias = Floats | None
 SOURCE_POINT = 1e-14
-"""Extent of a curve, relative to the size of its surface, up to which it counts as a point."""
+"""A curve of at most this extent, relative to the size of its surface, counts as a point."""
 
 
 @singledispatch
 def segments_of(
     source: CurveOrPoints | CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0
 ) -> CurveSegments:
-    """Cut source `number`, whose faces are those of the triangles, into segments; return `CurveSegments` as they are.
+    """Cut a curve or points, whose faces are those of `triangles`, into segments; return `CurveSegments` as they are.
 
-    Points that share no face are joined by geodesics. Given normals need `positions` of vertices or corners.
+    Consecutive points that share no face are joined by geodesics. Curves with normals need `positions` of vertices or
+    corners. `number` is that of the source, for error messages.
     """
     raise SourceError(
         f"source {number} is a {type(source).__name__}: on a surface, distance is measured to a "
@@ -58,7 +59,7 @@ def segments_of(
 def segments_of_each(
     sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh, positions: Positions = None
 ) -> list[list[CurveSegments]]:
-    """Cut several sources into segments; a sequence of curves and points among them counts as one source."""
+    """Cut several sources into segments, a list for each; a sequence of curves and points counts as one source."""
     return [
         [
             segments_of(item, triangles, positions, number)
@@ -116,7 +117,10 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
 
 
 def one_sided(sources: Sequence[CurveOrPoints | Sequence[CurveOrPoints]], triangles: IntrinsicMesh) -> list[int]:
-    """List sources with an oriented curve without normals along which faces cannot be oriented consistently."""
+    """List the numbers of sources with a curve, oriented but without normals, along which no side can be told.
+
+    Faces cannot be oriented consistently along such a curve, as around a Möbius band.
+    """
     if triangles.is_consistently_oriented:
         return []
     numbers = []
@@ -146,7 +150,7 @@ def is_element_list(source: object) -> TypeGuard[ElementList]:
 
 
 def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | SurfacePoints:
-    """Make a curve, or a point source, from vertices, edges with a fraction, and faces with coordinates."""
+    """Make a curve, or a point source for a single point, of a list in the format of potpourri3d: see `ElementList`."""
     kinds = np.array([min(len(given), FACE) for _, given in points])
     vertices, edges, faces = (
         np.array([element if kind == wanted else least for (element, _), kind in zip(points, kinds, strict=True)])
@@ -169,7 +173,10 @@ def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | Surf
 
 
 def as_curves(domain: object, sources: list[Any]) -> list[Any]:
-    """Convert lists of elements to curves, on surfaces only; those of an intrinsic triangulation are on its mesh."""
+    """Convert sources that are lists of elements to curves, if the domain is a surface; return others as they are.
+
+    Curves for an intrinsic triangulation are on its mesh.
+    """
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
         return sources
@@ -177,7 +184,7 @@ def as_curves(domain: object, sources: list[Any]) -> list[Any]:
 
 
 def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], WithoutLength | None]:
-    """Convert lists of elements to curves; leave out curves without length if there are other sources."""
+    """Convert lists of elements to curves; leave out curves without length, with a note, if there are other sources."""
     curves = as_curves(domain, sources)
     domain = getattr(domain, "mesh", domain)
     if not isinstance(domain, Surface):
@@ -193,13 +200,13 @@ def given_curves(domain: object, sources: list[Any]) -> tuple[list[Any], Without
 
 
 def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
-    """(n,) positions, among all sources that were given, of the n that were kept."""
-    clicks = [] if left_out is None else left_out.without_length
-    return np.setdiff1d(np.arange(n + len(clicks)), clicks)
+    """(n,) numbers, among all sources that were given, of the n that `given_curves` kept."""
+    dropped = [] if left_out is None else left_out.without_length
+    return np.setdiff1d(np.arange(n + len(dropped)), dropped)
 
 
 def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
-    """(n,) positions of the n curves that were kept, like `numbers_kept`, but counting every curve of a group."""
+    """(k,) numbers of all curves in the sources that were kept, counting every curve of a group, and those left out."""
     kept = numbers_kept(len(sources), left_out)
     counts = np.ones(kept.max(initial=-1) + 1, dtype=np.int64)
     counts[kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]
@@ -207,6 +214,7 @@ def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Int
 
 
 def _converted(domain: Surface, source: object) -> object:
+    """Convert lists of elements to curves, also within sequences; return other sources as they are."""
     if is_element_list(source):
         return curve_of_elements(domain.triangulation, source)
     if isinstance(source, Sequence) and not isinstance(source, str | bytes):
@@ -224,15 +232,16 @@ def _is_point(domain: Surface, curve: Curve) -> bool:
 
 
 NEARLY_CLOSED = 0.5
-"""A single piece is a curve with a gap if the distance between its ends, relative to its length, is less than this."""
+"""A single open curve is a loop with a gap if the distance between its ends, relative to its length, is less than
+this."""
 
 
 @dataclass(frozen=True, eq=False)
 class CurveGroups:
-    """Groups of open oriented curves, each group taken for the pieces of one interrupted curve."""
+    """Sizes of groups of open oriented curves; each group is treated as one curve with gaps."""
 
-    lengths: Floats  # (g,) total length of the pieces of each group
-    scales: Floats  # (g,) mean length of the pieces, weighted by length; of a single one the radius of a circle as long
+    lengths: Floats  # (g,) total length of the curves of each group
+    scales: Floats  # (g,) their mean length, weighted by length; for a single curve the radius of a circle as long
 
     @classmethod
     def of(cls, mesh: TriangleMesh, curves: Sequence[Any]) -> CurveGroups:
@@ -254,7 +263,10 @@ class CurveGroups:
 
 
 def nearest_others(ends: Floats) -> Ints:
-    """(2 k, 2) for each end of k pieces, its piece and the piece with the end nearest to it, perhaps the same one."""
+    """(2 k, 2) for each end of k curves, its curve, and the curve with the nearest end, perhaps the same one.
+
+    `ends` are (2 k, 3) positions, two for each curve.
+    """
     rows = np.arange(len(ends))
     piece = rows // 2
     distances, near = PointTree(ends).query(ends, k=min(3, len(ends)))

@@ -28,7 +28,7 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
     Parameters
     ----------
     triangulation : IntrinsicTriangulation
-        From `intrinsic_delaunay`.
+        The result of `intrinsic_delaunay`.
 
     Returns
     -------
@@ -74,7 +74,11 @@ def common_subdivision(triangulation: IntrinsicTriangulation) -> tuple[PolygonMe
 
 
 def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], Ints, LocatedPoints]:
-    """Find the polygons, the triangle of each, and the crossings of edges, which are corners from id n_vertices on."""
+    """Cut the triangles of an intrinsic triangulation along the edges of its mesh.
+
+    Return the vertex ids of each polygon, the (p,) triangle that each is part of, and the points where edges cross,
+    whose ids follow those of the vertices.
+    """
     triangles, n = triangulation.triangles, triangulation.n_vertices
     lines = triangulation.history.edges_after()
     lost = misplaced_lines(triangles, lines, triangulation.history.before.lengths_of_edges)
@@ -114,34 +118,37 @@ def subdivided(triangulation: IntrinsicTriangulation) -> tuple[list[list[int]], 
 
 
 def cut(outline: list[int], chords: list[tuple[int, int]]) -> list[list[int]]:
-    """Cut a convex polygon along chords between its corners, the shorter first, in linear time."""
+    """Cut a convex polygon along chords between its corners; return the corners of each part, in linear time.
+
+    `outline` lists its corners, and `chords` the two corners of each chord.
+    """
     if not chords:
         return [outline]
-    places = defaultdict(list)
+    indices_of = defaultdict(list)
     for k, corner in enumerate(outline):
-        places[corner].append(k)
-    between = [(a, b) for a, b in chords if a in places and b in places]
-    between.sort(key=lambda ends: abs(places[ends[0]][0] - places[ends[1]][0]))
+        indices_of[corner].append(k)
+    between = [(a, b) for a, b in chords if a in indices_of and b in indices_of]
+    between.sort(key=lambda ends: abs(indices_of[ends[0]][0] - indices_of[ends[1]][0]))
     following = [*range(1, len(outline)), 0]
     alive = [True] * len(outline)
-    parts, left = [], len(outline)
+    parts, n_left = [], len(outline)
     for chord in between:
-        ends = [next((k for k in places[corner] if alive[k]), -1) for corner in chord]
+        ends = [next((k for k in indices_of[corner] if alive[k]), -1) for corner in chord]
         first, last = min(ends), max(ends)
         if first < 0 or following[first] == last:
             continue
         part = [first]
         while part[-1] != last:
             part.append(following[part[-1]])
-        if len(part) < left:  # else it is a side of what is left
+        if len(part) < n_left:  # else it is a side of what is left
             parts.append([outline[k] for k in part])
             for k in part[1:-1]:
                 alive[k] = False
-            following[first], left = last, left - len(part) + 2
+            following[first], n_left = last, n_left - len(part) + 2
     return [*parts, [corner for corner, is_left in zip(outline, alive, strict=True) if is_left]]
 
 
-def positions(triangulation: IntrinsicTriangulation, places: LocatedPoints) -> Floats:
-    """(p, 3) positions in space of points of the triangulation."""
-    faces, barycentric, _ = triangulation.history.backward(places.faces, places.barycentric)
+def positions(triangulation: IntrinsicTriangulation, points: LocatedPoints) -> Floats:
+    """(p, 3) positions in space of p points of the triangulation."""
+    faces, barycentric, _ = triangulation.history.backward(points.faces, points.barycentric)
     return triangulation.in_space(*triangulation.refinement.pull_back(faces, barycentric))

@@ -1,4 +1,4 @@
-"""Base class of surface domains: how curves and points are placed on them, and level sets and boundaries as curves."""
+"""The base class of surface domains, which place curves and points, and extract level sets and boundaries as curves."""
 
 from __future__ import annotations
 
@@ -35,15 +35,16 @@ Place: TypeAlias = int | ArrayLike | CurveOrPoints | Sequence[CurveOrPoints]
 """A vertex, points in space, or curves and points on a surface."""
 
 ONE_CROSSING = 2e-5
-"""Distance, relative to a face's least height, up to which consecutive points of a curve count as one: where rounding
+"""Consecutive points of a curve count as one up to this distance, relative to a face's least height. Where rounding
 moves a line off a vertex, it crosses the edges there at points up to 1e-5 apart. Of 22,000 steps of completed curves on
 spheres none is between 3e-6 and 3e-5, and 15 are between 3e-5 and 1e-3."""
 
 
 def level_set(mesh: Triangles, values: Floats, level: float) -> list[Curve]:
-    """Extract a level set of a piecewise linear function by marching triangles; larger or equal values are to the left.
+    """Extract a level set of (n,) values at vertices, linear in faces, as curves with greater values to their left.
 
-    Faces with a NaN corner are skipped. If the faces are not consistently oriented, the curves get normals.
+    Values equal to the level count as greater. Faces with a NaN corner are skipped. If the faces are not consistently
+    oriented, the curves get normals.
     """
     faces, edges = mesh.faces, mesh.edges
     values = snapped(values, edges.vertices, level)
@@ -70,7 +71,7 @@ def level_set(mesh: Triangles, values: Floats, level: float) -> list[Curve]:
 
 
 def checked_levels(values: ArrayLike, level: float, n_vertices: int) -> tuple[Floats, float]:
-    """Return the values (n_vertices,) of a function and one of its levels as floats; refuse any other shape."""
+    """Return (n_vertices,) values and a level as floats; raise `SourceError` if there is not one value per vertex."""
     at_vertices, height = numbers(values, "values", SourceError), finite_number(level, "level")
     if at_vertices.shape != (n_vertices,):
         raise SourceError(
@@ -98,7 +99,7 @@ def without_repeats(mesh: Triangles, curves: Sequence[Curve]) -> list[Curve]:
 
 
 def snapped(values: Floats, ends: Ints, level: float) -> Floats:
-    """Set values (n,) that differ from a level by rounding only to that level; `ends` (e, 2) are the edges."""
+    """(n,) values, set to the level where they differ from it by rounding only; `ends` are the (e, 2) edges."""
     with np.errstate(invalid="ignore"):  # values may be infinite
         steps = np.abs(values[ends[:, 0]] - values[ends[:, 1]])
     steps[~np.isfinite(steps)] = 0.0
@@ -108,7 +109,7 @@ def snapped(values: Floats, ends: Ints, level: float) -> Floats:
 
 
 def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
-    """(k, 3) gradients of a piecewise linear function on faces (k,), each up to a positive factor."""
+    """(k, 3) gradients on (k,) faces of (n,) values at vertices, each up to a positive factor."""
     corners = mesh.vertices[mesh.faces[faces]]
     opposite = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)
     of_corners = np.cross(area_vectors(corners)[:, None], opposite)
@@ -119,7 +120,7 @@ def gradient_directions(mesh: Triangles, values: Floats, faces: Ints) -> Floats:
 
 
 def along_sides(mesh: Triangles, chosen: Bools) -> list[Curve]:
-    """Assemble curves along the `chosen` (m, 3) sides of faces, with the face to the left of each side."""
+    """Assemble curves along the sides of faces that are `chosen`, (m, 3) bool, with these faces to their left."""
     faces, sides = np.nonzero(chosen)
     following = (sides + 1) % 3
     tails, heads = mesh.faces[faces, sides], mesh.faces[faces, following]
@@ -137,7 +138,7 @@ def along_sides(mesh: Triangles, chosen: Bools) -> list[Curve]:
 
 
 def inward(mesh: Triangles, faces: Ints, sides: Ints) -> Floats:
-    """(k, 3) directions in the planes of faces (k,), orthogonal to one side of each and pointing inward."""
+    """(k, 3) directions in the planes of (k,) faces, orthogonal to one side of each, (k,), and pointing inwards."""
     corners = mesh.vertices[mesh.faces[faces]]
     row = np.arange(len(faces))
     along = corners[row, (sides + 1) % 3] - corners[row, sides]
@@ -151,7 +152,7 @@ def is_consistent(mesh: Triangles) -> bool:
 
 
 class LinearDomain(FieldDomain):
-    """A surface along which fields are linear in each triangle; their level sets are curves."""
+    """A surface on which fields are linear in each triangle, and level sets are curves."""
 
     level_set: Callable[[Floats, float], list[Curve]]
 
@@ -207,7 +208,7 @@ class Surface(Frozen, LinearDomain):
         Returns
         -------
         (m,) float
-            One for each vertex of the triangulation; at further ones in polygons, interpolated from the corners.
+            One for each vertex of the triangulation. At vertices added within polygons, values are interpolated.
 
         See Also
         --------
@@ -223,7 +224,7 @@ class Surface(Frozen, LinearDomain):
         return values
 
     def path(self, vertices: ArrayLike, closed: bool = False, oriented: bool = True) -> Curve:
-        """Join vertices, in order, by a curve with φ > 0 to its left.
+        """Join vertices, in order, by a curve.
 
         Parameters
         ----------
@@ -232,12 +233,12 @@ class Surface(Frozen, LinearDomain):
         closed : bool
             Whether the last vertex is joined to the first.
         oriented : bool
-            Whether the curve has a positive and a negative side.
+            Whether the curve has a positive side, to its left, and a negative side.
 
         Returns
         -------
         Curve
-            On this surface.
+            A curve on this surface.
 
         Raises
         ------
@@ -260,20 +261,20 @@ class Surface(Frozen, LinearDomain):
 
     @public_call
     def shortest_path(self, start: Place, end: Place) -> Curve:
-        """Find the shortest path along the surface: exact, straight in faces, and around corners where it must be.
+        """Find the shortest path along the surface, exactly: it is straight in faces, and may bend at vertices.
 
         Parameters
         ----------
         start : int, (3,) float, Curve or SurfacePoints; or several of these two
-            A vertex, the point of the surface nearest to a point in space, or curves and points, of which the path
-            leaves the nearest point. With ``field.contour()``, it leads from the zero set of a field.
+            A vertex; a point in space, which stands for the nearest point of the surface; or curves and points, of
+            which the path leaves the nearest. With ``field.contour()``, it leads from the zero set of a field.
         end : int, (3,) or (n, 3) float, or SurfacePoints
-            Where the path leads, to the nearest of these.
+            A vertex or points. Of several, the path leads to the nearest.
 
         Returns
         -------
         Curve
-            From start to end, without sides. Its length is the geodesic distance.
+            An unoriented curve from start to end. Its length is the geodesic distance.
 
         Raises
         ------
@@ -299,7 +300,7 @@ class Surface(Frozen, LinearDomain):
         return surface_paths.shortest_path(self, start, end)
 
     def points_at(self, vertices: ArrayLike) -> SurfacePoints:
-        """Take vertices as isolated point sources, from which φ grows in all directions.
+        """Return vertices as isolated point sources, from which distance grows in all directions.
 
         Parameters
         ----------
@@ -309,7 +310,7 @@ class Surface(Frozen, LinearDomain):
         Returns
         -------
         SurfacePoints
-            On this surface.
+            Points on this surface.
 
         Raises
         ------
@@ -330,12 +331,12 @@ class Surface(Frozen, LinearDomain):
         return SurfacePoints(*self._at_vertices(vertices, "point"))
 
     def positions(self, points: Curve | SurfacePoints) -> Floats:
-        """Positions in space of the points of a curve, or of isolated points.
+        """Return the positions in space of the points of a curve, or of isolated points.
 
         Parameters
         ----------
         points : Curve or SurfacePoints
-            On this surface.
+            A curve or points on this surface.
 
         Returns
         -------
@@ -366,23 +367,23 @@ class Surface(Frozen, LinearDomain):
     def polyline(
         self, points: ArrayLike, closed: bool = False, oriented: bool = True, max_distance: float | None = None
     ) -> Curve:
-        """Project a polyline in space on the surface: its closest points, joined by geodesic paths.
+        """Project the points of a polyline in space on the surface, and join them by geodesic paths.
 
         Parameters
         ----------
         points : (n, 3) float
-            Points in order.
+            Positions in order, in the units of the surface.
         closed : bool
             Whether the last point is joined to the first.
         oriented : bool
-            Whether the curve has a positive and a negative side.
+            Whether the curve has a positive side, to its left, and a negative side.
         max_distance : float, optional
             Largest distance of a point from the surface; 5 % of the diagonal of its bounding box by default.
 
         Returns
         -------
         Curve
-            One segment per face crossed.
+            A curve on this surface, with a segment for each face that it crosses.
 
         Raises
         ------
@@ -406,20 +407,20 @@ class Surface(Frozen, LinearDomain):
         return projected_curve(self.triangulation, points, closed, oriented, max_distance)
 
     def level_set(self, values: ArrayLike, level: float = 0.0) -> list[Curve]:
-        """Find the curves on which a function takes a value; it is linear between vertices, and larger to their left.
+        """Find the curves on which a function equals a level, with greater values to their left.
 
         Parameters
         ----------
         values : (n_vertices,) float
-            The function; faces with a NaN corner are skipped.
+            The function at the vertices, linear in each triangle. Faces with a NaN corner are skipped.
         level : float
-            The value, in the units of the function.
+            The level, in the units of the function.
 
         Returns
         -------
         list of Curve
             One for each connected component, open or closed; none if the function does not take the value. Curves cross
-            seams, edges at which vertices are given twice, if the function agrees on both sides of all of them.
+            seams, which are edges whose vertices are given twice, if the values agree on both sides of all seams.
 
         Raises
         ------
@@ -445,7 +446,7 @@ class Surface(Frozen, LinearDomain):
         return level_set(mesh.joined if seams_agree else mesh, at_corners, height)
 
     def region_boundary(self, face_mask: ArrayLike) -> list[Curve]:
-        """Find the boundary of a region of faces, with the region to its left, where distance to it is positive.
+        """Find the boundary of a region of faces, with the region to its left.
 
         Parameters
         ----------
@@ -502,16 +503,17 @@ class Surface(Frozen, LinearDomain):
         return along_sides(self.triangulation, (edges.face_counts == 1)[edges.face_edges])
 
     def _at_vertices(self, vertices: ArrayLike, name: str) -> tuple[Ints, Floats]:
+        """Return (n,) faces of `triangulation` at vertices, and (n, 3) barycentric coordinates of these vertices."""
         ids = self._triangulation_vertices(np.atleast_1d(array_of(vertices, f"vertex ids of a {name}", SourceError)))
         corners = corners_at(self.triangulation.faces, ids, self.n_vertices, name)
         return corners // 3, np.eye(3)[corners % 3]
 
     def _triangulation_vertices(self, vertices: Ints) -> Ints:
-        """Return the vertices of `triangulation` that correspond to vertices of the domain."""
+        """(n,) vertices of `triangulation` that correspond to (n,) vertices of the domain."""
         return vertices
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
-        """Turn a mask of the faces of the domain into a mask of the faces of `triangulation`."""
+        """Convert a mask of the faces of the domain to one of the faces of `triangulation`; raise if it does not fit."""
         check_mask(face_mask, self.triangulation.n_faces)
         return face_mask
 
@@ -547,7 +549,7 @@ class PlaceableTriangles(Triangles, Protocol):
 def projected_curve(
     mesh: PlaceableTriangles, points: ArrayLike, closed: bool, oriented: bool, max_distance: float | None
 ) -> Curve:
-    """Find the points of a mesh closest to `points`, and join them by geodesic paths."""
+    """Make the curve of `Surface.polyline`, on a mesh."""
     points = coordinates(points, "points of the polyline", 3, SourceError)
     if len(points) < 2:
         raise SourceError(
@@ -575,16 +577,17 @@ def projected_curve(
 
 
 def closest_points(mesh: PlaceableTriangles, points: Floats) -> tuple[Ints, Floats, Floats]:
-    """Face, barycentric coordinates and distance of the closest point on a mesh, for each of (n, 3) points."""
+    """Find the points of a mesh closest to (n, 3) points: (n,) faces, (n, 3) barycentric coordinates, (n,) distances."""
     faces, weights = mesh.search_tree.nearest(points)
     closest = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])
     return faces, weights, np.linalg.norm(points - closest, axis=1)
 
 
 def placed(mesh: PlaceableTriangles, points: object) -> tuple[Ints, Floats, tuple[int, ...]]:
-    """(n,) faces of points and (n, 3) barycentric coordinates in them, and the shape that the points have.
+    """Place points on a mesh: (n,) faces, (n, 3) barycentric coordinates, and the leading shape of the given points.
 
-    Points are those of a curve, `SurfacePoints`, or positions in space, for which the closest points are taken.
+    These are the points of a curve, `SurfacePoints`, or (..., 3) positions in space, which stand for the closest points
+    of the mesh.
     """
     if isinstance(points, Curve | SurfacePoints):
         refuse_missing("face", points.faces, mesh.n_faces)
@@ -602,12 +605,12 @@ class SurfaceInterpolant:
     values: NDArray[Any]  # at the vertices of the triangles
 
     def __call__(self, points: object) -> Floats:
-        """Return (...) values at points that `placed` takes."""
+        """Return (...) values at the points of a curve, `SurfacePoints`, or (..., 3) positions."""
         faces, weights, shape = placed(self.mesh, points)
         return shaped(np.einsum("ik,ik->i", weights, self.values[self.mesh.faces[faces]]), shape)
 
     def gradient(self, points: object) -> Floats:
-        """(..., 3) gradients in space."""
+        """(..., 3) gradients in space at such points."""
         faces, _, shape = placed(self.mesh, points)
         return shaped(self.cell_gradients[faces], shape)
 

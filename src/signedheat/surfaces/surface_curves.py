@@ -19,25 +19,25 @@ class Curve(Frozen):
     """A polyline on a surface; φ > 0 to its left if it is oriented.
 
     Left is the direction of the curve rotated by 90° counter-clockwise, as seen with the face normal towards you. For a
-    segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, the
-    side is that of most of the curve, and is kept along it. Points on an edge or at a vertex are recognised
-    as such whichever face they are given through (barycentric coordinates below 1e-9 count as zero). Consecutive points
-    that share no face are joined by a geodesic path; consecutive points may coincide.
+    segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, left is
+    what it is along most of the curve. Points on an edge or at a vertex are recognised as such, whichever face they are
+    given in (barycentric coordinates below 1e-9 count as zero). Consecutive points that share no face are joined by a
+    geodesic path. Consecutive points may coincide.
 
     Parameters
     ----------
     faces : (n,) int
         Face that each point lies in; any face that contains the point.
     barycentric : (n, 3) float
-        Barycentric coordinates in that face.
+        Barycentric coordinates in that face: weights of its three corners, which add up to 1.
     closed : bool
         Whether the last point is joined to the first.
     oriented : bool
         Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
     normals : (segments, 3) float, optional
         Direction in space in which φ grows across each segment. Needed where left has no meaning: for curves along
-        which a surface that is not orientable loses its orientation, and to make parts agree whose faces are not
-        consistently oriented. Normals are projected on the surface; their lengths are ignored.
+        which a surface that is not orientable loses its orientation, and for curves in several parts of a surface that
+        are oriented differently. Normals are projected on the surface; their lengths are ignored.
 
     Raises
     ------
@@ -108,7 +108,7 @@ class Curve(Frozen):
         Returns
         -------
         Curve
-            With the same points from last to first.
+            The same points, from last to first.
 
         See Also
         --------
@@ -176,15 +176,18 @@ class SurfacePoints(Frozen):
 
 
 CurveOrPoints: TypeAlias = Curve | SurfacePoints
-"""What distance on a surface is measured to."""
+"""A source of distance on a surface."""
 CurvesAndPoints: TypeAlias = CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]]
-"""One source or several; curves and points in a sequence of their own count as one."""
+"""One source or several; curves and points in a sequence within the sequence count as one source."""
 ElementList: TypeAlias = Sequence[tuple[int, Sequence[float]]]
 """A curve in the format of potpourri3d: vertices (id, []), edges (id, [t]) and faces (id, [u, v]) in order."""
 
 
 def surface_points(faces: ArrayLike, barycentric: ArrayLike, name: str) -> tuple[Ints, Floats]:
-    """Check face ids and barycentric coordinates as far as possible without the surface; return them read-only."""
+    """Check face ids and barycentric coordinates as far as possible without the surface.
+
+    Return (n,) ids and (n, 3) coordinates, read-only; raise `SourceError` if they are invalid. `name` is for messages.
+    """
     ids = np.atleast_1d(array_of(faces, f"face ids of a {name}", SourceError))
     if ids.size == 0:
         return frozen(np.empty(0, dtype=np.int64)), frozen(np.empty((0, 3)))

@@ -35,7 +35,7 @@ from .vector_heat import VectorHeat, extrapolated, nonmanifold_frames
 
 @dataclass(frozen=True, eq=False)
 class SurfaceDiscretization:
-    """The discretisation of a surface."""
+    """A surface discretised for the signed heat method, which is run on the triangles of an intrinsic mesh."""
 
     domain: Any  # on which fields are returned: a mesh, a cloud, a digital surface, an intrinsic triangulation
     triangles: IntrinsicMesh  # on which the method runs
@@ -47,8 +47,8 @@ class SurfaceDiscretization:
     triangulation: IntrinsicTriangulation | None = None  # of the domain; the field on it is kept, too
     spacing: float = math.nan  # h: by default half the mean edge length, the distance between midpoints of edges
     notes: tuple[Note, ...] = ()  # on repairs made in building the triangles, for the diagnostics of every field
-    # the same but for first faces at nonmanifold edges, on which step 3 does not depend; whatever has other triangles
-    # or another spacing has none
+    # the discretisation that differs only in first faces at nonmanifold edges, on which step 3 does not depend; those
+    # with other triangles or another spacing have none
     unturned: SurfaceDiscretization | None = None
     # by diffusion time, of which there is a second one where curves end
     _heats: LastUsed[float, VectorHeat] = field(default_factory=lambda: LastUsed(2), init=False, repr=False)
@@ -83,7 +83,10 @@ class SurfaceDiscretization:
         return elimination_order(self.stiffness) if self.unturned is None else self.unturned.vertex_order
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
-        """Refine the triangles to conform to unoriented curves; choose frames at nonmanifold edges."""
+        """Refine the triangles to conform to unoriented curves, and choose frames at nonmanifold edges.
+
+        Return the discretisation for these sources, and the sources as lists of segments on it.
+        """
         triangles, segments = refine_to_conform(self.triangles, self.segments(sources))
         surface = self
         if triangles is not self.triangles:  # the present vertices come first in them
@@ -93,7 +96,7 @@ class SurfaceDiscretization:
         return surface._turned_to(triangles), groups
 
     def segments(self, sources: Sequence[Any]) -> list[list[CurveSegments]]:
-        """Cut the sources, given on the domain, into segments on the triangles."""
+        """Cut sources on the domain into segments on the triangles, a list for each source."""
         if self.transfer is not None:
             sources = [self.transfer(source) for source in sources]
         positions = self.positions
@@ -102,7 +105,7 @@ class SurfaceDiscretization:
         return segments_of_each(sources, self.triangles, positions)
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """Use triangles with other first faces at nonmanifold edges; share step 3, which does not depend on them."""
+        """Return the discretisation with other first faces at nonmanifold edges; it shares step 3 with this one."""
         if triangles is self.triangles:
             return self
 
@@ -110,11 +113,11 @@ class SurfaceDiscretization:
         return self._turned(key, lambda: replace(self, triangles=triangles, unturned=self))
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> Any:
-        """Compute X₀ (Eq. 11, Eq. 19) and the rows that interpolate φ along the sources (Eq. 14)."""
+        """Make a `SurfaceSource`: X₀ (Eq. 11, Eq. 19), and the rows that interpolate φ along the sources (Eq. 14)."""
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
     def diffuse(self, source: Any) -> list[Complexes]:
-        """Solve ``(M + tL) X = X₀`` (Eq. 12): one vector per edge, in stages (see `VectorHeat`)."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): (e, c) vectors in edge frames for each stage, see `VectorHeat.solve`."""
         return self.diffuse_many([source])[0]
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[Complexes]]:
@@ -124,7 +127,10 @@ class SurfaceDiscretization:
         return heat.solve([source.vectors for source in sources], changes=2 if sources[0].extrapolated else 0)
 
     def to_cells(self, stages: list[Complexes]) -> Complexes:
-        """(m,) sum of X over the edges of each face, three times the mean (Sec. 6), from its last stage without NaN."""
+        """(m,) directions in faces: sums of X over their edges (Sec. 6), from the last stage without NaN there.
+
+        Stages with more than one column are extrapolated in t.
+        """
         sums = self.triangles.sums_in_faces(stages[0])
         for stage in stages[1:]:
             later = self.triangles.sums_in_faces(stage)
@@ -132,11 +138,14 @@ class SurfaceDiscretization:
         return extrapolated(sums) if sums.shape[1] > 1 else sums[:, 0]
 
     def divergence(self, directions: Complexes) -> Floats:
-        """b, the right-hand side of ``C φ = b`` (Eq. 13)."""
+        """(n,) b, the right-hand side of ``C φ = b`` (Eq. 13), for (m,) directions in faces."""
         return divergence(self.triangles, directions)
 
     def reached_by(self, vectors: sparse.csr_array) -> Bools:
-        """(n_vertices,) whether a vertex has a face in a component with a source: vectors diffuse across edges only."""
+        """(n_vertices,) whether each vertex has a face in a component with a source; heat crosses edges only.
+
+        `vectors` are the (1, e) X₀ of the source.
+        """
         parts = self.triangles.face_components
         if not parts.any():
             return np.ones(self.triangles.n_vertices, dtype=bool)
@@ -147,12 +156,13 @@ class SurfaceDiscretization:
 
 @discretize.register
 def _(domain: TriangleMesh) -> SurfaceDiscretization:
+    """Discretise a triangle mesh, or raise `MemoryLimitError` if it does not fit in memory."""
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     return lowered_mesh(domain)
 
 
 def lowered_mesh(domain: TriangleMesh) -> SurfaceDiscretization:
-    """Discretise a mesh, whose memory the caller has checked."""
+    """Discretise a mesh without checking its memory."""
     triangles, added = laid_out(domain.joined, 1e-6)
     share, joined = large_angles(triangles), vertices_joined(domain)
     notes = (*([EdgesLengthened(added)] if added else []), *([LargeAngles(share)] if share else []), *joined)
@@ -160,13 +170,16 @@ def lowered_mesh(domain: TriangleMesh) -> SurfaceDiscretization:
 
 
 def vertices_joined(mesh: TriangleMesh) -> list[Note]:
-    """Note how many vertices were joined at seams, if any."""
+    """Return a note on how many vertices were joined at seams; none if no vertex was."""
     count = int((mesh.places != np.arange(mesh.n_vertices)).sum())
     return [VerticesJoined(count)] if count else []
 
 
 def large_angles(triangles: IntrinsicMesh) -> float:
-    """Fraction of angles above 120°, or 0 if below 1 %. Many of them make directions far from the source inaccurate."""
+    """Return the fraction of angles above 120°, or 0 if it is below 1 %.
+
+    Many such angles make directions far from the source inaccurate.
+    """
     share = float((triangles.corner_cotangents < -(3**-0.5)).mean())
     return share if share >= 0.01 else 0.0
 
@@ -177,13 +190,16 @@ Measured on 20,000 to 310,000 triangles with one diffusion time."""
 
 
 def memory_estimate(n_triangles: int) -> float:
-    """Estimate the memory, in bytes, that the first distance on `n_triangles` triangles takes."""
+    """Return the estimated memory, in bytes, that the first distance on `n_triangles` triangles takes."""
     each, per_doubling = BYTES_PER_TRIANGLE[chosen_backend()]
     return n_triangles * (each + per_doubling * math.log2(max(n_triangles, 2)))
 
 
 def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if triangles for `count` elements, and `more` bytes, do not fit into memory."""
+    """Raise `MemoryLimitError` if distance on so many triangles, and `more` bytes, do not fit into memory.
+
+    For the message, they belong to `count` elements, such as "points".
+    """
     each = triangles / max(count, 1)
     refuse_beyond_memory(
         f"distance on {count:,} {elements}",
@@ -194,9 +210,9 @@ def refuse_too_many(triangles: int, count: int, elements: str, more: float = 0.0
 
 
 SURFACE_SPRINGS = 100.0
-"""Strength of the springs along curves that cross faces, in 1/h: measured on twenty meshes, good and bad."""
+"""Strength of the springs that hold φ along curves across faces, in 1/h: measured on twenty meshes, good and bad."""
 SOFT_STRENGTH = 10.0
-"""λ of `Soft` where none is given, in 1/h."""
+"""Default λ of `Soft`, in 1/h."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +221,7 @@ class SurfaceIntegration(SpringIntegration):
 
     @property
     def soft_weight(self) -> float:
-        """λ of `Soft` where none is given, in 1/length."""
+        """Default λ of `Soft`, in 1/length."""
         return SOFT_STRENGTH / SURFACE_SPRINGS * self.strength
 
     def anchored(self, source: SourceTerm) -> Factor:
@@ -213,7 +229,10 @@ class SurfaceIntegration(SpringIntegration):
         return self._pulled_factor(source.interpolation, DirectIntegration.springs(self, source))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
-        """Put springs at two Gauss points per segment (exact for linear φ), and at points; see `SpringIntegration`."""
+        """Return the rows that interpolate φ at the springs, and their strengths; see `SpringIntegration`.
+
+        Springs are at two Gauss points of each segment, which is exact for linear φ, and at isolated points.
+        """
         assert isinstance(source, SurfaceSource)
         n, springs = len(source.weights), self.springs(source)
         ends, lengths = ends_among(source.parts, np.arange(n)), np.concatenate([p.lengths for p in source.parts])
@@ -227,7 +246,7 @@ class SurfaceIntegration(SpringIntegration):
         return places, np.concatenate([np.repeat(0.5 * self.strength * lengths, 2), springs[points]])
 
     def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Impose levels: exactly along edges, to some hundredths of h across faces (Eq. 14)."""
+        """(n,) φ with given levels along sources (Eq. 14): exactly along edges, to some hundredths of h in faces."""
         if (np.diff(source.interpolation.indptr) == 1).all():
             return self.fit_exactly(divergence, source, levels)
         fitted = super().fit(divergence, source, levels)
@@ -238,19 +257,21 @@ class SurfaceIntegration(SpringIntegration):
 
 
 LIGHTER = 0.87
-"""Memory per triangle of polygons, relative to other triangles: few edges meet at virtual vertices. From quads."""
+"""Memory per triangle of polygons, relative to other triangles, since few edges meet at virtual vertices. Measured on
+quads."""
 
 
 @discretize.register
 def _(domain: PolygonMesh) -> SurfaceDiscretization:
+    """Discretise a polygon mesh, or raise `MemoryLimitError` if it does not fit in memory."""
     refuse_too_many(round(LIGHTER * len(domain.corners)), domain.n_polygons, "polygons")
     return lowered_polygons(domain)
 
 
 def lowered_polygons(domain: PolygonMesh) -> SurfaceDiscretization:
-    """Discretise polygons, whose memory the caller has checked, with h from their own edges.
+    """Discretise polygons without checking their memory; h is half the mean length of their own edges.
 
-    φ is solved for on virtual vertices, too: if they were eliminated (``PᵀCP``), a curve across polygons could not be a
+    φ is solved for on virtual vertices, too. If they were eliminated (``PᵀCP``), a curve across polygons could not be a
     level set of φ, which would be constant on whole polygons.
     """
     lowered = lowered_mesh(domain.triangulation)
@@ -265,7 +286,7 @@ BYTES_OF_NEIGHBORS, BYTES_PER_POINT = 40_000_000, 1300
 
 @discretize.register
 def _(domain: PointCloud) -> SurfaceDiscretization:
-    """Return the discretization on the cloud's local triangles, with values at the points."""
+    """Discretise a point cloud by its local triangles, with values at the points."""
     # h is the mean distance between neighbouring points, the scale below which they do not determine the surface
     refuse_too_many(
         2 * domain.n_points, domain.n_points, "points", more=BYTES_OF_NEIGHBORS + BYTES_PER_POINT * domain.n_points
@@ -285,9 +306,11 @@ BYTES_PER_VOXEL = 20
 
 @discretize.register
 def _(domain: DigitalSurface) -> SurfaceDiscretization:
-    # Each square becomes four triangles between its moved corners and their mean. h is the standard deviation of the
-    # Gaussian with which normals are estimated, and at least the voxel size: at a smaller scale the shape is unknown,
-    # and diffusion would follow the directions of the lattice.
+    """Discretise a digital surface by four triangles for each square, between its moved corners and their mean.
+
+    h is the standard deviation of the Gaussian with which normals are estimated, and at least the voxel size: at a
+    smaller scale the shape is unknown, and diffusion would follow the directions of the lattice.
+    """
     faces = count_surfels(domain.volume)
     refuse_too_many(4 * faces, faces, "faces of voxels", more=BYTES_PER_VOXEL * domain.volume.size)
     mesh, corners = domain.triangulation, domain.smooth_vertices

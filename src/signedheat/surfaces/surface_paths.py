@@ -1,4 +1,4 @@
-"""Shortest paths between places on a surface."""
+"""Shortest paths between points or curves on a surface."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def shortest_path(surface: Surface, start: Place, end: Place) -> Curve:
 
 
 def _placed(surface: Surface, place: Place, name: str) -> list[CurveOrPoints]:
-    """Return what was given as the start or end of a path, as curves and points."""
+    """Return the start or end of a path as curves and points on the surface; `name` is for error messages."""
     if isinstance(place, Curve | SurfacePoints):
         return [place]
     if isinstance(place, Integral):

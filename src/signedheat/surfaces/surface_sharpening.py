@@ -35,17 +35,18 @@ from .surface_discretization import SurfaceDiscretization
 from .surface_source import SurfaceSource, lie_along
 
 ROUGHLY = 1e-4
-"""Tolerance of distances that are only compared, with differences below a thousandth ignored."""
+"""Tolerance of distances that are only compared, where differences below a thousandth do not matter."""
 INVENTED = 0.05
-"""Share of the zero set that completes curves without ends, above which there is a warning that these bound nothing."""
+"""If more than this share of the curves and what completes them is completion, though no curve has a free end, there is
+a warning that they bound nothing."""
 UNDECIDED = 0.1
-"""Share of the vertices whose sides curves without ends decide, up to which these bound nothing: curves that bound a
-region decide all vertices but those next to them. With it, no level set of 96 on eight meshes causes a warning."""
+"""Curves that decide the sides of at most this share of the vertices bound nothing, since curves that bound a region
+decide all vertices but those next to them. With it, no level set of 96 on eight meshes causes a warning."""
 INVENTED_IF_UNDECIDED = 1e-3
-"""`INVENTED` for curves that bound nothing: a loop around a hole through a plate has a completion of that share if the
-hole's circumference is that share of its own."""
+"""The same as `INVENTED` for curves that bound nothing. A loop around a hole through a plate has a completion of this
+share if the circumference of the hole is this share of its own."""
 FALSE_ZERO_WIDTH = 4.0
-"""Distance from an unoriented source, relative to h, within which zeros of φ may be due to that source alone."""
+"""Zeros of φ within this distance of an unoriented source, relative to h, may be due to that source alone."""
 
 
 @sharpen_on.register(Surface)
@@ -57,6 +58,7 @@ def _(
     method: Method | None,
     progress: Progress | None,
 ) -> Field[SurfaceDomain]:
+    """Sharpen a field on a surface; with a finer field, that is sharpened, and its first values are used."""
     if field.finest is not field:
         same = replace(field.finest, diagnostics=field.diagnostics)
         fine = sharpen_on(same.domain, same, source, method, progress)
@@ -74,7 +76,10 @@ def _(
 
 
 def at_triangles(surface: SurfaceDiscretization, field: Field[SurfaceDomain]) -> Floats:
-    """Values at the vertices of the surface's triangles, by `on_triangulation`, or with NaN where it lacks them."""
+    """(n_vertices,) values of a field at the vertices of the surface's triangles.
+
+    If the triangles are not those of `on_triangulation`, they are NaN at vertices that the field's domain lacks.
+    """
     if isinstance(field.domain, IntrinsicTriangulation):
         return field.values  # its vertices are those of the triangles
     values = field.domain.on_triangulation(field.values)
@@ -93,6 +98,7 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
+    """Measure distance to `given` curves, or without any to the zero set of φ."""
     if given is None:
         return nearest_zero(surface, values, source, tolerance, report)
     curves, _left_out = given_curves(surface.domain, as_list(given))
@@ -139,9 +145,9 @@ def nearest_curve(
     tolerance: float,
     report: Report | None,
 ) -> Nearest:
-    """Measure distance to curves and points, and to the zero set of φ where oriented curves are missing.
+    """Measure distance to curves and points, and to the zero set of φ where it completes oriented curves.
 
-    Curves decide sides in regions that they bound, and next to them; far from them the zero set of φ counts.
+    Curves decide sides in regions that they bound, and next to them; elsewhere the signs of φ, `values`, do.
     """
     placed = PlacedSegments.of(triangles, parts)
     if not any(part.oriented for part in parts):
@@ -183,9 +189,9 @@ def nearest_curve(
 def distance_without_heat(
     source: SurfaceSource, tolerance: float, report: Report | None
 ) -> tuple[Floats, tuple[Note, ...]] | None:
-    """Measure signed distance to curves that decide the sides of all vertices; None if they do not.
+    """Measure signed distance to curves that decide the sides of all vertices: (n,) values, and notes.
 
-    It equals `nearest_curve`, which then needs no φ.
+    None if they do not decide all. The values are those of `nearest_curve`, which then needs no φ.
     """
     triangles, parts = source.triangles, source.parts
     placed = PlacedSegments.of(triangles, parts)
@@ -206,7 +212,7 @@ def distance_without_heat(
 
 
 def connected_to(triangles: IntrinsicMesh, faces: Ints) -> Bools:
-    """(n,) vertices of the faces that are connected to some of them."""
+    """(n,) whether each vertex is a corner of a face that is connected to one of (k,) `faces`."""
     parts = triangles.face_components
     return mask_of(triangles.n_vertices, triangles.corner_vertices[np.isin(parts, parts[faces])])
 
@@ -222,9 +228,10 @@ def missing_parts(
     report: Report | None,
     reach: float,
 ) -> tuple[PlacedSegments, list[int]]:
-    """Find the parts of the zero set of φ that complete the curves, and the number of windows of each search.
+    """Find the parts of the zero set of φ that complete the curves, as segments, and the window counts of searches.
 
-    `distance`, (n,), is inf beyond `reach`, which is three times the size of a face or more.
+    They lie away from the curves, or beyond their free ends, and not in regions that curves bound. `distance` are the
+    (n,) distances from the curves, inf beyond `reach`, which is three times the size of a face or more.
     """
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
@@ -250,9 +257,10 @@ def missing_parts(
 
 
 def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
-    """(n,) φ with NaN around parts of its zero set that are `near` (n,) unoriented sources and at no `sided` vertex.
+    """(n,) φ, with NaN around parts of its zero set that are only due to unoriented sources.
 
-    φ is zero at such a source only on average, so it may change sign around it.
+    Such a part has only vertices `near`, (n,), these sources, and none of the `sided` vertices of oriented ones. φ is
+    zero at an unoriented source only on average, so it may change sign around it.
     """
     signs = np.sign(values)[triangles.corner_vertices]
     crossed = np.flatnonzero((signs.min(axis=1) < 0) & (signs.max(axis=1) > 0))
@@ -271,7 +279,7 @@ def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, s
 
 
 def note_on_searches(triangles: IntrinsicMesh, *counts: int) -> GeodesicWindows:
-    """Note the windows of searches, and warn if one was cut short."""
+    """Return a note on the numbers of windows of searches; warn if one was cut short."""
     note = GeodesicWindows(sum(counts), cut_short=max(counts) >= window_limit(triangles))
     if note.cut_short:
         warn_user(f"exact distance was cut short: {note}", InexactWarning)
@@ -289,7 +297,7 @@ class CurveSides:
 
 
 def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
-    """Find the sides of curves: a region that no curve crosses lies on one side if all segments next to it agree."""
+    """Find the sides of vertices: a region that no curve crosses lies on one side if all segments next to it agree."""
     ends = free_ends(triangles, placed)
     nearby, reach = nearest_sides(triangles, placed, ends)
     oriented = placed.sides != 0
@@ -309,13 +317,13 @@ def curve_sides(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSides:
 
 
 def on_curves(triangles: IntrinsicMesh, placed: PlacedSegments) -> Bools:
-    """(n,) whether a vertex is a node of oriented curves."""
+    """(n,) whether each vertex is a node of oriented curves."""
     nodes = placed.nodes[np.unique(placed.ends[placed.sides != 0])]
     return mask_of(triangles.n_vertices, nodes.elements[nodes.kinds == VERTEX])
 
 
 def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
-    """Nodes, not at the boundary of the surface, at which more segments of oriented curves begin than end, or fewer."""
+    """(k,) nodes at which not as many segments of oriented curves begin as end, off the boundary of the surface."""
     _, once = np.unique(placed.given, return_index=True)
     sides, ends = placed.sides[once], placed.ends[once]
     n = len(placed.nodes)
@@ -324,7 +332,11 @@ def free_ends(triangles: IntrinsicMesh, placed: PlacedSegments) -> Ints:
 
 
 def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) -> tuple[Ints, Floats]:
-    """(n,) side and distance of the oriented segment in the faces at each vertex that is nearest, then most frontal."""
+    """(n,) side of the nearest oriented segment in the faces at each vertex, 1, −1 or 0, and (n,) distance to it.
+
+    Of equally near segments, it is the one that the vertex is most in front of. The side is 0 without any, if such
+    segments disagree, and next to free `ends`, (k,) nodes.
+    """
     n = triangles.n_vertices
     rows = np.flatnonzero(placed.sides != 0)
     start, step = placed.positions[rows, :1], np.diff(placed.positions[rows], axis=1)

@@ -1,4 +1,4 @@
-"""Sources on surfaces, lowered to X₀ of Eq. 12 (Eq. 11, Eq. 19) and to the rows A of Eq. 14 that interpolate φ."""
+"""Sources on surfaces, *lowered* to X₀ of Eq. 12 (Eq. 11, Eq. 19) and to the rows A of Eq. 14 that interpolate φ."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .source_segments import segments_of_each
 
 @dataclass(frozen=True, eq=False)
 class SurfaceSource(Frozen):
-    """Curves and points, lowered to an intrinsic mesh."""
+    """Curves and points, lowered to an intrinsic mesh: what the signed heat method needs of them."""
 
     vectors: csr_array  # (1, e) X₀, in the frames of the edges
     time: float  # t of Eq. 12
@@ -44,7 +44,10 @@ class SurfaceSource(Frozen):
 
     @cached_property
     def ending(self) -> Bools:
-        """(m,) whether an oriented curve ends, off boundary and nonmanifold edges, in the connected part of a face."""
+        """(m,) whether an oriented curve ends in the same connected part as each face, off its boundary.
+
+        Nonmanifold edges count as boundary, too.
+        """
         triangles = self.triangles
         oriented = [part for part in self.parts if part.oriented]
         if not oriented:
@@ -57,7 +60,7 @@ class SurfaceSource(Frozen):
 
 
 def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> Bools:
-    """(p,) whether points lie on one of the chosen `edges` (e,), or at a vertex of one."""
+    """(p,) whether p points lie on one of the chosen `edges`, (e,) bool, or at a vertex of one."""
     vertices = mask_of(triangles.n_vertices, triangles.edges.vertices[edges])
     return ((points.kinds == VERTEX) & vertices[points.elements % triangles.n_vertices]) | (
         (points.kinds == EDGE) & edges[points.elements % triangles.n_edges]
@@ -67,8 +70,8 @@ def lie_along(triangles: IntrinsicMesh, points: LocatedPoints, edges: Bools) -> 
 def surface_source(triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: float, spacing: float) -> SurfaceSource:
     """Lower sources to an intrinsic mesh, whose faces they refer to; ``t = diffusion · spacing²``.
 
-    A sequence within `sources` counts as one; a point weighs as much as a curve of length `spacing`. Unoriented curves
-    must run along edges (`refine_to_conform`).
+    A sequence within `sources` counts as one source. A point weighs as much as a curve of length `spacing`. Unoriented
+    curves must run along edges (`refine_to_conform`).
     """
     groups = segments_of_each(sources, triangles)
     parts = [part for group in groups for part in group]
@@ -107,7 +110,7 @@ def surface_source(triangles: IntrinsicMesh, sources: Sequence[Any], diffusion: 
 
 
 def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> csr_array:
-    """(1, e) sums of i(b − a) over segments ab (Eq. 11): on their own edge, or a third on each edge of their face.
+    """(1, e) sums of i(b − a) over segments ab (Eq. 11): on the edge along which one runs, or a third on each edge.
 
     ψ_e(m) is replaced by its mean, ⅓. (The published code adds the whole vector to each of the three edges.)
     """
@@ -122,10 +125,10 @@ def oriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -
 
 
 def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments], spacing: float) -> csr_array:
-    """(1, e) vectors away from curves along edges, and from free ends, where one such edge ends alone (App. A.2).
+    """(1, e) vectors away from unoriented curves, which run along edges, and from their free ends (App. A.2).
 
-    A face beside an edge jk adds p_k − p_j, turned by 90 degrees into the face, to its other edges; on the edge itself
-    the two sides cancel (Eq. 11, Eq. 19).
+    A face beside an edge jk adds p_k − p_j, rotated by 90 degrees into the face, to its other edges. On the edge itself
+    the two sides cancel (Eq. 11, Eq. 19). A vertex is a free end if a single such edge ends there.
     """
     curves = [p for p in parts if len(p.ends) and not p.oriented]
     if not curves:
@@ -149,7 +152,10 @@ def unoriented_vectors(triangles: IntrinsicMesh, parts: Sequence[CurveSegments],
 
 
 def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
-    """(1, e) X₀ of points at vertices: a corner from direction d on by angle α adds i d (1 − e^{iα}) / Θ (Eq. 19)."""
+    """(1, e) X₀ of points at vertices (Eq. 19).
+
+    A corner that begins at direction d and has angle α adds i d (1 − e^{iα}) / Θ, with Θ the total angle of the vertex.
+    """
     faces, corners = np.nonzero(mask_of(triangles.n_vertices, vertices)[triangles.corner_vertices])
     leaving = triangles.edge_vectors[faces, corners]
     arriving = -triangles.edge_vectors[faces, (corners + 2) % 3]
@@ -163,8 +169,8 @@ def vertex_point_vectors(triangles: IntrinsicMesh, vertices: Ints) -> csr_array:
 def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_array:
     """(1, e) X₀ of points on edges and in faces: −∇δ_p tested with ψ_e, ``⟨−∇δ_p, ψ_e⟩ = ∇ψ_e(p)``.
 
-    It gives the gradient of the heat kernel. At vertices of equilateral triangles it would be Eq. 19 divided by √3 h;
-    the caller multiplies by that factor.
+    It gives the gradient of the heat kernel. At vertices of equilateral triangles it would be Eq. 19 divided by √3 h,
+    by which `surface_source` therefore multiplies it.
     """
     corner = np.argwhere(located.barycentric > 0)
     vertices = triangles.corner_vertices[located.faces[corner[:, 0]], corner[:, 1]]
@@ -177,50 +183,50 @@ def inner_point_vectors(triangles: IntrinsicMesh, located: LocatedPoints) -> csr
 
 
 def from_faces(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> csr_array:
-    """(1, e) sums of face vectors (k,), each of which counts for all three edges of its face (k,)."""
+    """(1, e) sums of (k,) vectors in (k,) faces over the faces at each edge, in the frames of edges."""
     in_frames = triangles.in_edge_frames(vectors[:, None], faces)
     return scatter(triangles.n_edges, triangles.edges.face_edges[faces], in_frames)
 
 
 def scatter(n: int, index: Ints, values: Complexes) -> csr_array:
-    """(1, n) sparse sums of values with the same index."""
+    """(1, n) sparse sums of values with the same index from 0 to n − 1; both arrays have the same shape."""
     flat = index.ravel()
     return csr_array((values.ravel(), (np.zeros(len(flat), dtype=np.int64), flat)), shape=(1, n), dtype=np.complex128)
 
 
 def line_elements(part: CurveSegments, spacing: float) -> Floats:
-    """(s,) half the length of the segments that meet at each node; `spacing` at isolated points."""
+    """(s,) half the length of the segments that meet at each node of a source; `spacing` for isolated points."""
     if len(part.ends) == 0:
         return np.full(len(part.nodes), spacing)
     return np.bincount(part.ends.ravel(), np.repeat(0.5 * part.lengths, 2), len(part.nodes)).astype(np.float64)
 
 
 def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, Ints]:
-    """Join the points of all sources; return the distinct ones, and the two at the ends of every segment."""
+    """Return the distinct nodes of all sources, and the (k, 2) ids of those at the ends of all segments."""
     nodes = concatenated([p.nodes for p in parts])
     first, who = unique_points(nodes)
     return nodes[first], ends_among(parts, who)
 
 
 def ends_among(parts: Sequence[CurveSegments], who: Ints) -> Ints:
-    """(k, 2) point ids at the ends of every segment of all parts, where `who` has the point id of each node."""
+    """(k, 2) point ids at the ends of all segments of all parts; `who` are the (s,) point ids of all nodes."""
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends: Ints = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
     return who[ends]
 
 
 def connected(parts: Sequence[CurveSegments]) -> Ints:
-    """(s,) connected component of every node, over all sources, in order of first appearance."""
+    """(s,) connected component, of the union of all sources, of each node; numbered by first appearance."""
     first, who = unique_points(concatenated([p.nodes for p in parts]))
     return connected_components(len(first), *ends_among(parts, who).T)[who]
 
 
 def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: float) -> tuple[Ints, Complexes]:
-    """Faces (j,), and vectors (j,) in them away from the free ends of curves, for the half disk behind each end.
+    """Make vectors away from the free ends of curves, over the half disk behind each end: (j,) faces, (j,) vectors.
 
-    Behind means at least a quarter of the total angle away from the curve; at boundary and nonmanifold vertices, a
-    right angle. The vectors of an end weigh as much as its edge, but at least `least`, so that they do not vanish at
-    short edges. (The published code has no such minimum.)
+    An end is the last of the (k,) `edges` and its vertex. Behind means at least a quarter of the total angle away from
+    the curve; at boundary and nonmanifold vertices, a right angle. The vectors of an end weigh as much as its edge, but
+    at least `least`, so that they do not vanish at short edges. (The published code has no such minimum.)
     """
     faces, vectors = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.complex128)]
     starts, members = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
@@ -251,9 +257,10 @@ def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: 
 
 
 def angles_from(spoke: int, right: Ints, left: Ints, angle: Floats, n_spokes: int) -> Floats:
-    """(n_spokes,) angle from one spoke (edge at a vertex) to all others, the shortest way around; inf if not connected.
+    """(n_spokes,) angles from one spoke, an edge at a vertex, to all spokes, the shortest way around, in radians.
 
-    Corner k lies between spokes ``right[k]`` and ``left[k]``, and has the angle ``angle[k]``.
+    Corner k lies between spokes ``right[k]`` and ``left[k]``, and has the angle ``angle[k]``. Spokes that are not
+    connected to the first by corners have ∞.
     """
     away = np.full(n_spokes, np.inf)
     away[spoke] = 0.0

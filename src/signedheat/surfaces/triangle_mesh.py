@@ -33,7 +33,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
     vertices : (n, 3) float
         Positions; vertices that no face uses are allowed.
     faces : (m, 3) int
-        Vertex ids. The normal of a face points to the side from which its corners run counter-clockwise.
+        Vertex ids of each face, counter-clockwise as seen from the side to which its normal points.
 
     Raises
     ------
@@ -138,11 +138,11 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @property
     def is_watertight(self) -> bool:
-        """Whether each edge has exactly two faces, which agree on the outside.
+        """Whether each edge has exactly two faces, which run along it in opposite directions.
 
-        Ends of open edges are one vertex if only rounding separates them.
-        The same is meant by *closed* in `signedheat info`, ``fill`` and ``watertight``. Files without numbers of
-        vertices, such as STL, join bodies that touch along an edge, which has four faces then.
+        Ends of open edges count as one vertex if only rounding separates them. *Closed* means the same in `signedheat
+        info`, ``fill`` and ``watertight``. In files without vertex ids, such as STL, bodies that touch along an edge
+        share it, and it then has four faces.
 
         Examples
         --------
@@ -155,15 +155,15 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def n_bad_edges(self) -> int:
-        """Number of edges that not exactly two faces share, or along which these disagree: see `is_watertight`."""
+        """Number of edges without exactly two faces that run along it in opposite directions: see `is_watertight`."""
         table = edge_table(self._welded_faces)
         return int(((table.face_counts != 2) | (table.balance != 0)).sum())
 
     @cached_property
     def _welded_faces(self) -> Ints:
-        """(k, 3) faces between vertices of which those on open edges are one if they differ by rounding.
+        """(k, 3) faces after vertices of open edges that differ by rounding were merged.
 
-        Faces on fewer than three such vertices are left out.
+        Faces on fewer than three vertices are left out.
         """
         tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         faces = joined_rims(self.vertices, tails, heads, ONE_PLACE)[self.faces]
@@ -182,7 +182,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def places(self) -> Ints:
-        """(n,) id of the first boundary vertex at the position of each, as along seams; its own id if it is inside."""
+        """(n,) id of the first boundary vertex at the position of each boundary vertex; others have their own id."""
         return joined_rims(self.vertices, self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel(), SEAM_UNITS)
 
     @cached_property
@@ -193,18 +193,18 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @cached_property
     def first_copies(self) -> Ints:
-        """(k,) ids of the faces that do not have the same three vertices as an earlier one, in whatever order."""
+        """(k,) ids of the faces that do not have the same three vertices as an earlier face, in any order."""
         return np.unique(copied_faces(self.faces, self.n_vertices))
 
     @cached_property
     def once(self) -> TriangleMesh:
-        """The mesh without faces that are given again: with those of `first_copies` alone."""
+        """The mesh without duplicate faces: only those of `first_copies`."""
         kept = self.first_copies
         return self if len(kept) == self.n_faces else TriangleMesh(self.vertices, self.faces[kept])
 
     @cached_property
     def search_tree(self) -> TriangleTree:
-        """Tree to find the faces nearest to points."""
+        """Search tree that finds the faces nearest to points."""
         return TriangleTree.of(self.vertices[self.faces])
 
     @property

@@ -1,4 +1,4 @@
-"""Step 1 on an intrinsic mesh: vector heat on its edges, by one factorisation, with restarts against underflow.
+"""Step 1 of the method on an intrinsic mesh: vector heat on its edges, by one factorisation, restarted at underflow.
 
 The connection Laplacian and mass are those of Crouzeix and Raviart (Eq. 8, Eq. 9). Frames at nonmanifold edges are
 chosen so that heat enters the edge from its first face.
@@ -25,7 +25,7 @@ from ..mesh.unit_vectors import unit
 from .cotan import assemble
 
 TIME_EXPONENTS = (-1.0, 0.5)
-"""Powers of t in the error of Y: h²/t from cells that do not resolve exp(−r/√t), and √t from smoothing."""
+"""Powers of t in the errors of Y: h²/t, since cells do not resolve exp(−r/√t), and √t, from smoothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,14 +48,15 @@ class VectorHeat:
 
     @cached_property
     def mass(self) -> Floats:
-        """(n_edges,) the diagonal of M. |X| is at most |X₀| divided by its least entry."""
+        """(n_edges,) diagonal of M. |X| is at most |X₀| divided by its least entry."""
         thirds = np.repeat(self.triangles.face_areas / 3.0, 3)
         return np.bincount(self.triangles.edges.face_edges.ravel(), thirds).astype(np.float64)
 
     def solve(self, sources: Sequence[csr_array], changes: int = 0) -> list[list[Complexes]]:
-        """Return X for each X₀, in stages (n_edges, 1 + `changes`) with columns X, R X, R² X, …, ``R = (M + tL)⁻¹ M``.
+        """Solve for each of the (1, n_edges) X₀; return a list of stages for each, (n_edges, 1 + `changes`).
 
-        Each stage has a scale of its own, and NaN at edges where another stage has the values.
+        The columns of a stage are X, R X, R² X, …, with ``R = (M + tL)⁻¹ M``. Each later stage has values, with a scale
+        of their own, only at edges where the one before has underflowed, and NaN elsewhere.
         """
         starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
         for k, source in enumerate(sources):
@@ -64,13 +65,18 @@ class VectorHeat:
         return [[s.values for s in self._restarted(starts[:, k], together[:, k])] for k in range(len(sources))]
 
     def _restarted(self, start: Complexes, values: Complexes) -> list[Stage]:
+        """Return the stages of one source, from its (n_edges, c) right-hand sides and the first solutions."""
+
         def solve(loads: Complexes) -> Complexes:
             return self._solve(loads[:, None])[:, 0]
 
         return restart(solve, self._border_forces, start, Stage(values, 0.0), float(self.mass.min()))
 
     def _border_forces(self, columns: Complexes, faint: Bools) -> tuple[Bools, Complexes]:
-        """Return the edges of faces only some of whose edges are faint, and X₀_j of `_solve` there for columns X_j."""
+        """(n_edges,) edges next to `faint` ones in a face, and (n_edges, c) right-hand sides of `_solve` there.
+
+        These are what the matrix gives for the (n_edges, c) columns X_j of a solution that has underflowed elsewhere.
+        """
         edges = self.triangles.edges.face_edges
         is_faint = faint[edges]
         border = mask_of(len(faint), edges[is_faint.any(axis=1) & ~is_faint.all(axis=1)])
@@ -80,7 +86,7 @@ class VectorHeat:
         return border, forces
 
     def _solve(self, loads: Complexes) -> Complexes:
-        """(n_edges, k, c) ``(M + tL) X_j = X₀_j + M X_{j-1}`` along the last axis, for each of k columns."""
+        """(n_edges, k, c) solutions of ``(M + tL) X_j = X₀_j + M X_{j-1}``, j along the last axis, for k sources."""
         solution = np.empty_like(loads)
         for j in range(loads.shape[2]):
             pushed = loads[:, :, j] if j == 0 else loads[:, :, j] + self.mass[:, None] * solution[:, :, j - 1]
@@ -88,7 +94,7 @@ class VectorHeat:
         return solution
 
     def _solve_columns(self, columns: Complexes) -> Complexes:
-        """(n_edges, k) solutions, whether the matrix is complex or has the parts of each unknown in turn."""
+        """(n_edges, k) solutions of (M + tL) X = columns, whether the matrix is complex or has two rows per edge."""
         if self.factor.n == len(columns):
             return self.factor.solve(columns)
         pairs = np.stack([columns.real, columns.imag], axis=1).reshape(2 * len(columns), -1)
@@ -97,7 +103,7 @@ class VectorHeat:
 
 
 def extrapolated(columns: Complexes) -> Complexes:
-    """(m,) directions Y without errors like the `TIME_EXPONENTS` of t, from (m, 3) columns X, R X and R² X.
+    """(m,) unit directions Y without errors like t to the `TIME_EXPONENTS`, from (m, 3) columns X, R X and R² X.
 
     With ``D = t d/dt`` it is ``Π (1 − D/e) Y`` over exponents e, which takes ``t^e`` to zero. For ``R = (M + tL)⁻¹ M``,
     ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
@@ -112,7 +118,9 @@ def extrapolated(columns: Complexes) -> Complexes:
 
 
 def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
-    """Upper triangle of ``M + t L`` (Eq. 12) in edge frames: complex (e, e), or real (2e, 2e) with reflections.
+    """Return the upper triangle of ``M + t L`` (Eq. 12) in edge frames: complex (e, e), or real (2e, 2e).
+
+    It is real if faces are not consistently oriented, since reflections are not complex factors.
 
     L (Eq. 9) has ``2 (cot α + cot β)`` on the diagonal, α and β the corners of a face at the ends of the edge, and ``−2
     cot θ conj(z_fe) z_fg`` between edges e and g that meet in θ (Eq. 8). M is a third of the area of each face.
@@ -125,7 +133,10 @@ def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matr
 
 
 def vector_heat_forces(triangles: IntrinsicMesh, time: float, vectors: Complexes, faces: Ints) -> Complexes:
-    """``(M + t L) X`` of Eq. 12, summed over some faces: complete at edges all of whose faces are among them."""
+    """(n_edges,) ``(M + t L) X`` of Eq. 12, summed over some faces only, for (n_edges,) vectors X.
+
+    It is complete at edges all of whose faces are among them.
+    """
     diagonal, factor = _local_entries(triangles, time, faces)
     x = triangles.from_edge_frames(vectors[triangles.edges.face_edges[faces]], faces)
     forces = diagonal * x + factor * np.roll(x, -1, axis=1) + np.roll(factor * x, 1, axis=1)
@@ -135,14 +146,17 @@ def vector_heat_forces(triangles: IntrinsicMesh, time: float, vectors: Complexes
 
 
 def _local_entries(triangles: IntrinsicMesh, time: float, faces: Ints | slice) -> tuple[Floats, Floats]:
-    """(m, 3) diagonal entries of M + tL; (m, 3) entries between each edge and the next, before the turn of Eq. 8."""
+    """(m, 3) diagonal entries of M + tL, and (m, 3) entries between each edge and the next, before rotation (Eq. 8)."""
     cot = triangles.corner_cotangents[faces]
     following = np.roll(cot, -1, axis=1)  # at the corner that edge k shares with edge k + 1
     return triangles.face_areas[faces, None] / 3.0 + 2.0 * time * (cot + following), -2.0 * time * following
 
 
 def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
-    """Assemble the real matrix of blocks ``B_feᵀ B_fg``; the columns of B_fe are the axes of the edge in the face."""
+    """Assemble the real (2e, 2e) matrix of blocks ``B_feᵀ B_fg``, whose columns B_fe are the axes of edge e in face f.
+
+    `diagonal` and `factor` are those of `_local_entries`.
+    """
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
     second = np.where(triangles.reflected, -1j, 1j) * z
@@ -169,7 +183,8 @@ def nonmanifold_frames(
 ) -> tuple[IntrinsicMesh, Sequence[Sequence[CurveSegments]]]:
     """Make the face nearest to the sources the first face of every edge with more than two faces.
 
-    Vectors that pass between two other faces are reflected. Edges whose ends are nearer still keep their first face.
+    Heat that passes between two other faces is reflected. Edges whose ends are nearer still keep their first face.
+    Return the triangles with these frames, and the groups of segments with vectors in them.
     """
     table = triangles.edges
     if table.face_counts.max(initial=0) <= 2:
@@ -198,13 +213,13 @@ def nonmanifold_frames(
 
 
 def mirrored(part: CurveSegments, changed: Bools) -> CurveSegments:
-    """Reflect the vectors of segments on edges whose frames have changed."""
+    """Reflect the vectors of segments along edges whose frames have `changed`, (e,)."""
     on_changed = (part.edges >= 0) & changed[part.edges]
     return replace(part, vectors=np.where(on_changed, np.conj(part.vectors), part.vectors))
 
 
 def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Floats:
-    """(n_vertices,) distance of every vertex from the sources, along edges from the corners of the sources' faces."""
+    """(n_vertices,) distance from the sources: straight to the corners of their faces, and then along edges."""
     nodes = concatenated([part.nodes for part in parts])
     corners = triangles.corner_positions[nodes.faces]
     at = np.einsum("nk,nk->n", nodes.barycentric, corners)
