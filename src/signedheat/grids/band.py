@@ -67,7 +67,7 @@ class Band(Grid[Literal[3]]):
 
     @property
     def grid(self) -> Grid[Literal[3]]:
-        """The whole grid."""
+        """The whole grid that the band is a part of."""
         return cast("Grid[Literal[3]]", Grid(self.origin, self.spacing, self.shape))
 
     @property

@@ -17,27 +17,28 @@ from ..arrays import Floats
 from ..compiled import compiled
 
 BLOCK = 8
-"""Nodes along each edge of a block."""
+"""Number of nodes along each edge of a block."""
 CUBE = 16
-"""Blocks along each edge of a cube."""
+"""Number of blocks along each edge of a cube."""
 BLOCK_NODES = BLOCK**3
-"""Nodes in a block."""
+"""Number of nodes in a block."""
 WINDOW = 8
-"""Blocks along each edge of a window: large grids are worked on window by window."""
+"""Number of blocks along each edge of a window; large grids are contoured window by window."""
 Tables: TypeAlias = tuple[NDArray[np.int32], NDArray[np.int32]]
+"""The tables that find blocks, see `Blocks.tables`."""
 
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """The blocks of a grid that exist."""
+    """The blocks of a grid at whose nodes there are values."""
 
-    # (n, 3) their first nodes, divided by `BLOCK`, in order of cubes, and of rows within each cube
+    # (n, 3) indices of the blocks: their first nodes, divided by `BLOCK`; in order of cubes, and of rows within each
     places: NDArray[np.int32]
     shape: tuple[int, int, int]  # nodes of the grid along each axis
 
     @classmethod
     def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
-        """Make the blocks at (n, 3) places, which need neither be sorted nor distinct."""
+        """Make blocks from their (n, 3) indices, which need neither be sorted nor distinct."""
         cubes = -(-np.array(shape) // (BLOCK * CUBE))
         ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
         cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
@@ -50,7 +51,7 @@ class Blocks:
 
     @cached_property
     def tables(self) -> Tables:
-        """The number of each cube, −1 if it holds no block; and (cubes, 16, 16, 16) the block at each place, or −1."""
+        """(a, b, c) numbers of cubes, −1 for those without blocks, and (cubes, 16, 16, 16) numbers of blocks, or −1."""
         cubes = np.full(tuple(-(-n // (BLOCK * CUBE)) for n in self.shape), -1, dtype=np.int32)
         if not len(self):
             return cubes, np.full((0, CUBE, CUBE, CUBE), -1, dtype=np.int32)
@@ -64,7 +65,7 @@ class Blocks:
         return cubes, rows
 
     def rows(self, places: NDArray[np.integer]) -> NDArray[np.int32]:
-        """Return (k,) the number of the block at each of (k, 3) places; −1 where there is none, or outside the grid."""
+        """(k,) number of the block with each of (k, 3) indices; −1 if there is none, or outside the grid."""
         wanted = np.asarray(places, dtype=np.int64)
         limit = -(-np.array(self.shape) // BLOCK)
         inside = np.flatnonzero(((wanted >= 0) & (wanted < limit)).all(axis=1))
@@ -82,7 +83,7 @@ class BlockValues:
     """Values at the nodes of blocks, indexed by nodes like an array of the whole grid."""
 
     blocks: Blocks  # the blocks whose nodes have values
-    values: NDArray[np.floating[Any]]  # (n, 8, 8, 8) their values; NaN where they have none
+    values: NDArray[np.floating[Any]]  # (n, 8, 8, 8) their values; NaN at nodes beyond the grid
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -90,7 +91,7 @@ class BlockValues:
         return self.blocks.shape
 
     def __getitem__(self, nodes: tuple[NDArray[np.integer], ...]) -> Floats:
-        """Return (k,) values at nodes, given by their three indices; NaN where there is no block."""
+        """(k,) values at nodes, given by three (k,) arrays of indices; NaN where there is no block."""
         wanted = np.stack(nodes, axis=1)
         row = self.blocks.rows(wanted // BLOCK)
         result = np.full(len(row), np.nan)
@@ -100,12 +101,12 @@ class BlockValues:
         return result
 
     def interpolated(self, points: Floats) -> Floats:
-        """Interpolate linearly at (k, 3) points in cells; NaN where one of the nodes around has no value."""
+        """(k,) values, interpolated linearly at (k, 3) points in cells; NaN where a node around has no value."""
         limit = np.array(self.shape, dtype=np.float64) - 1
         return _interpolate(self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit)
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
-        """Return the values in a box of `shape` nodes whose lowest node is `first`; NaN where there is none."""
+        """Return the values in a box of `shape` nodes whose lowest node is `first`; NaN where there are none."""
         low, high = first // BLOCK, -(-(first + np.array(shape)) // BLOCK)
         counts = high - low
         rows = self.blocks.rows(low + np.indices(counts).reshape(3, -1).T)
@@ -119,7 +120,10 @@ class BlockValues:
 
 @compiled
 def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, limit: Floats) -> Floats:
-    """Interpolate linearly at points in cells; NaN outside the grid, with last node `limit`, and without a block."""
+    """(k,) values, interpolated linearly at (k, 3) points in cells.
+
+    NaN outside the grid, whose last node is `limit`, and where a node around is in no block.
+    """
     cubes, rows = tables
     out = np.empty(len(points))
     for p in range(len(points)):

@@ -11,13 +11,13 @@ from ..arrays import Floats, Ints
 from ..mesh.edges import CLEARANCE
 
 ON_LEVEL = 1e-3
-"""Distance from a level, in cells, up to which a point counts as lying on it."""
+"""A point lies on a level if it is at most this far from it, in cells."""
 POINTS_AT_ONCE = 1 << 16
 """Batch size for points that are moved."""
 
 
 class NodeValues(Protocol):
-    """Values at the nodes of a grid, by their indices: an array, or anything that is indexed like one."""
+    """Values at the nodes of a grid: an array, or anything that is indexed by arrays of node indices like one."""
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -32,9 +32,11 @@ def on_level(
     spacing: Floats,
     level: float,
 ) -> Floats:
-    """Move (n, d) points, given in cells, along edges of a grid to the exact level; return their places in space.
+    """Move (n, d) points, given in cells, along edges of a grid to an exact level; return their (n, d) positions.
 
-    They are found by regula falsi (Dowell & Jarratt 1971).
+    `distance` is the exact function of positions, and `values` are its values at nodes. Points are not moved if they
+    are not on an edge, or if its ends are not on both sides of the level. It is found by regula falsi (Dowell & Jarratt
+    1971).
     """
     if len(points) > POINTS_AT_ONCE:
         parts = np.split(points, range(POINTS_AT_ONCE, len(points), POINTS_AT_ONCE))
@@ -46,7 +48,7 @@ def on_level(
     upper[np.arange(len(points)), axis] += 1
     inside = (base >= 0).all(axis=1) & (upper < np.array(values.shape)).all(axis=1)
     movable = np.flatnonzero(inside & ((fraction > 0).sum(axis=1) == 1))
-    low, high = (values[tuple(at[movable].T)] - level for at in (base, upper))
+    low, high = (values[tuple(nodes[movable].T)] - level for nodes in (base, upper))
     crossed = (low < 0) != (high < 0)
     movable, low, high = movable[crossed], low[crossed], high[crossed]
     moved = origin + points * spacing
@@ -58,11 +60,11 @@ def on_level(
             break
         share = low[active] / (low[active] - high[active])
         share = np.clip(start[active] + share * (stop[active] - start[active]), CLEARANCE, 1 - CLEARANCE)
-        at = base[active].astype(np.float64)
-        at[np.arange(len(active)), axis[active]] += share
-        places = origin + at * spacing
-        off = distance(places) - level
-        moved[movable[active]] = places
+        cells = base[active].astype(np.float64)
+        cells[np.arange(len(active)), axis[active]] += share
+        positions = origin + cells * spacing
+        off = distance(positions) - level
+        moved[movable[active]] = positions
         same = (off < 0) == (low[active] < 0)
         ahead, behind = active[same], active[~same]
         start[ahead], low[ahead] = share[same], off[same]

@@ -123,7 +123,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         padding: float | None = None,
         spacing: ArrayLike | None = None,
     ) -> Grid[int]:
-        """Make a grid centred on a shape, on several or on a box, with padding on every side.
+        """Make a grid around a shape, several shapes or a box, with padding on every side.
 
         Parameters
         ----------
@@ -139,12 +139,12 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         Returns
         -------
         Grid
-            With nodes on every side of the box.
+            A grid centred on the box.
 
         Raises
         ------
         GeometryError
-            If the box has no extent and there is no padding, or resolution, padding or spacing are out of range.
+            If the box is a single point and there is no padding, or resolution, padding or spacing are out of range.
 
         See Also
         --------
@@ -203,7 +203,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
 
     @property
     def points(self) -> Floats:
-        """Positions of the nodes, coordinates last; not cached, since they take d times the memory of a field."""
+        """(..., d) positions of the nodes, in the shape of the grid; not cached, since they take much memory."""
         return np.stack(np.meshgrid(*self.axes, indexing="ij"), axis=-1)
 
     def contains(self, points: ArrayLike) -> Bools:
@@ -275,7 +275,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         return GridInterpolant(self, values)
 
     def _clipped(self, points: ArrayLike) -> Floats:
-        """Return for each point (..., d) the nearest point of the grid's box."""
+        """(..., d) the nearest point of the grid's box for each of (..., d) points."""
         places, shape = query_points(points, self.dimension)
         return np.clip(places, self.origin, self.upper).reshape(*shape, self.dimension)
 
@@ -290,7 +290,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         return TriangleMesh(vertices, faces)
 
     def _placed(self, points: Floats, values: NodeValues, level: float, exact: Exact | None) -> Floats:
-        """Return the positions in space of points of a level set, which are given in cells."""
+        """(n, d) positions of points of a level set, given in cells; with the exact function, moved onto its level."""
         if exact is None:
             return self.origin + points * self.spacing
         return on_level(exact, points, values, self.origin, self.spacing, level)
@@ -325,13 +325,13 @@ def other_nodes() -> GeometryError:
 
 @dataclass(frozen=True, eq=False)
 class GridInterpolant:
-    """Multilinear interpolation between nodes; outside the grid, linear extrapolation from the nearest point of it."""
+    """Multilinear interpolation between nodes; outside the grid, linear extrapolation from its nearest point."""
 
     grid: Grid
     values: NDArray[Any]  # at the nodes, NaN where there are none
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """Return (...) values at (..., d) points: of the nodes around those that have one; NaN where none has."""
+        """(...) values at (..., d) points; next to nodes without a value, of the others around; NaN if none has one."""
         places, shape = query_points(points, self.grid.dimension)
         (values,) = in_chunks(self._values_at, places)
         return shaped(values, shape)
@@ -346,7 +346,7 @@ class GridInterpolant:
         return np.clip(points, self.grid.origin, self.grid.upper)
 
     def _values_at(self, points: Floats) -> tuple[Floats]:
-        """Return values at (n, d) points, within the box and outside of it."""
+        """(n,) values at (n, d) points, within the box and outside of it."""
         inside = self._into_box(points)
         values = self._between(inside)
         away = points - inside
@@ -357,7 +357,7 @@ class GridInterpolant:
         return (values,)
 
     def _between(self, points: Floats) -> Floats:
-        """Return values at (n, d) points within the box."""
+        """(n,) values at (n, d) points within the box."""
         index = ((points - self.grid.origin) / self.grid.spacing).T
         if self._defined is None:
             return scipy.ndimage.map_coordinates(self.values, index, order=1, mode="nearest")
@@ -373,7 +373,7 @@ class GridInterpolant:
         return None if defined.all() else (np.where(defined, self.values, 0.0), defined.astype(np.float64))
 
     def _slopes(self, points: Floats) -> Floats:
-        """Return (n, d) central differences of the interpolant: they equal those at the nodes, interpolated."""
+        """(n, d) central differences of the interpolant, which equal those at the nodes, interpolated."""
         slopes = np.empty_like(points)
         for axis, step in enumerate(self.grid.spacing):
             ahead, behind = points.copy(), points.copy()

@@ -1,4 +1,4 @@
-"""Regular grids as a discretisation: diffusion by sweeps, integration by cosine transforms (Sec. 8).
+"""Regular grids discretised for the signed heat method: diffusion by sweeps, integration by cosine transforms (Sec. 8).
 
 C is inverted by the cosine transform, and constraints are corrections of that solution.
 """
@@ -27,22 +27,24 @@ from .node_sources import NodeSources
 from .stencil import divergence, interpolation_stencil, laplacian, padded_shape, solve_poisson
 
 BYTES_PER_GRID_NODE, BYTES_PER_CELL = {1: 42, 2: 42, 3: 25, 4: 42}, 930
-"""Measured peak memory of a distance computation for each node, by dimension; and for each square cell of surface in
-space."""
+"""Measured peak memory of a distance computation per node, by dimension; and per square cell of surface in space."""
 MOST_BYTES_PER_NODE = 30
-"""Most bytes that surface adds for each node: where it fills the whole grid. With 22 the estimate for 64 balls on 128³
+"""Largest memory per node that a surface adds, if it fills the whole grid. With 22 the estimate for 64 balls on 128³
 nodes was three quarters of what was measured."""
 
 
 def memory_estimate(grid: Grid, per_node: float | None = None, extra: float = 0.0) -> int:
-    """Estimate the peak memory, in bytes, of a distance on a grid, or of work with `per_node` and `extra` bytes."""
+    """Return the estimated peak memory, in bytes, of distance on a grid, or of work that takes `per_node` bytes a node.
+
+    `extra` bytes are added.
+    """
     if per_node is None:
         per_node = BYTES_PER_GRID_NODE[grid.dimension]
     return int(per_node * grid.n_nodes + extra) + libraries()
 
 
 def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
-    """Estimate the bytes that a surface of this area adds on a grid in space; 0 in other dimensions."""
+    """Return the estimated bytes that a surface of this area adds on a grid in space; 0 in other dimensions."""
     if len(spacing) != 3:
         return 0.0
     cells = float(area / float(np.prod(spacing)) ** (2 / 3))
@@ -50,7 +52,10 @@ def bytes_of_area(area: float, spacing: Floats, n_nodes: float) -> float:
 
 
 def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 0.0, area: float = 0.0) -> None:
-    """Raise `MemoryLimitError` if a distance computation on the grid needs too much memory, before allocating."""
+    """Raise `MemoryLimitError` if distance on the grid, to a surface of this area, does not fit into memory.
+
+    `per_node` and `extra` are those of `memory_estimate`.
+    """
     available, needed = available_memory(), memory_estimate(grid, per_node, extra)
     needed += int(bytes_of_area(area, grid.spacing, grid.n_nodes))
     if available is None or needed <= available:
@@ -69,7 +74,7 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
 def fitting_spacing(
     grid: Grid, available: int, per_node: float | None = None, extra: float = 0.0, area: float = 0.0
 ) -> Floats:
-    """Return (d,) roughly the least spacing, proportional to the grid's, with which its box fits into memory."""
+    """(d,) roughly the least spacing, in proportion to that of the grid, with which its box fits into memory."""
     base = memory_estimate(grid, 0.0, extra)
     whole = memory_estimate(grid, per_node, extra) - base
     spacing: Floats = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
@@ -86,43 +91,49 @@ def fitting_spacing(
 
 @dataclass(frozen=True, eq=False)
 class GridSource:
-    """Sources on a grid: samples of their area elements, and X₀ at the nodes."""
+    """Sources lowered to a grid: samples of their area elements, and X₀ at the nodes."""
 
     samples: AreaSamples  # area elements, merged in each cell and component, and X₀
     grid: Grid
     diffusion: float  # τ in ``t = τ max(h, h_source)²``
 
     def time_on(self, spacing: float) -> float:
-        """Return t on a coarser grid of this mean spacing: as on this grid, but large enough that √t spans a cell."""
+        """Return t on a coarser grid with this mean spacing: as on this grid, but large enough that √t spans a cell."""
         return self.time if spacing <= self._step else max(self.time, spacing**2)
 
     @property
     def time(self) -> float:
+        """t of Eq. 12."""
         return self.diffusion * max(self._step, self.samples.spacing) ** 2
 
     @property
     def finest(self) -> int:
-        """How often the grid can be coarsened until √t spans one cell: finer grids add no accuracy."""
+        """How often the grid can be coarsened until √t spans one cell; finer grids would not be more accurate."""
         return max(0, int(np.log2(np.sqrt(self.time) / self._step) + 1e-6))
 
     @property
     def _step(self) -> float:
+        """Mean spacing of the grid."""
         return float(self.grid.spacing.mean())
 
     @property
     def vectors(self) -> NodeSources:
+        """X₀ at the nodes."""
         return self.samples.nodes
 
     @property
     def weights(self) -> Floats:
+        """(s,) area that each sample stands for."""
         return self.samples.weights
 
     @property
     def components(self) -> Ints:
+        """(s,) connected component of the sources that each sample belongs to."""
         return self.samples.components
 
     @property
     def source_ids(self) -> Ints:
+        """(s,) source that each sample belongs to."""
         return self.samples.source_ids
 
     @cached_property
@@ -132,52 +143,57 @@ class GridSource:
 
     @cached_property
     def interpolation(self) -> csr_matrix:
+        """(s, n_nodes) matrix that interpolates node values at the samples."""
         nodes, weights = self.stencil
         starts = np.arange(len(nodes) + 1) * nodes.shape[1]
         size = (len(nodes), self.grid.n_nodes)
         return csr_matrix((weights.ravel(), nodes.ravel(), starts), shape=size)
 
     def at_samples(self, values: Floats) -> Floats:
-        """Return (s,) node values interpolated at the samples."""
+        """(s,) values at the nodes, interpolated at the samples."""
         nodes, weights = self.stencil
         return np.einsum("ij,ij->i", values.ravel()[nodes], weights)
 
 
 @dataclass(frozen=True, eq=False)
 class GridDiscretization(DiffusesEach):
-    """A grid as a discretisation."""
+    """A grid discretised for the signed heat method; see `Discretization` for its methods."""
 
     grid: Grid
 
     @cached_property
     def integration(self) -> GridIntegration:
+        """Step 3 of the method."""
         return GridIntegration(self.grid)
 
     def adapt(self, sources: Sequence[Any]) -> tuple[GridDiscretization, Sequence[Any]]:
+        """Return this discretisation and the sources, since grids are not adapted to sources."""
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> GridSource:
-        """Compute X₀, area vectors spread to nodes (Eq. 11 in space), and the rows that interpolate φ on the source."""
+        """Sample the sources, and spread their area vectors to the nodes as X₀ (Eq. 11 in space); `diffusion` is τ."""
         samples = sample_on_grid(sources, self.grid)
         refuse_large_grid(self.grid, area=float(samples.weights.sum()))
         return GridSource(samples, self.grid, diffusion)
 
     def diffuse(self, source: GridSource) -> list[Level]:
-        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12); in flat space each component of X diffuses by itself."""
+        """Solve ``(1 − tΔ) X = X₀`` (Eq. 12) on a hierarchy of grids; in flat space components diffuse separately."""
         return diffuse_multilevel(source.vectors, source.time_on, source.finest)
 
     def to_cells(self, vectors: list[Level]) -> NDArray[np.float32]:
+        """(*shape, d) unit vectors along X at the nodes."""
         dimension = self.grid.dimension
         directions = collapse(vectors, padded_shape(self.grid.shape), dimension, unit_vectors)
         return np.moveaxis(directions.reshape(dimension, *self.grid.shape), 0, -1)
 
     def divergence(self, directions: NDArray[np.floating]) -> Floats:
-        """Compute b, the right-hand side of ``C φ = b`` (Eq. 13)."""
+        """Compute b, the right-hand side of ``C φ = b`` (Eq. 13), in the shape of the grid."""
         return divergence(directions, self.grid.spacing)
 
 
 @discretize.register
 def _(domain: Grid) -> GridDiscretization:
+    """Discretise a grid, or raise `MemoryLimitError` if distance on it does not fit in memory."""
     if domain.dimension > 4:
         raise SourceError(f"grids have up to 4 dimensions here, not {domain.dimension}", element="domain")
     refuse_large_grid(domain)
@@ -185,39 +201,46 @@ def _(domain: Grid) -> GridDiscretization:
 
 
 PENALTY = 10.0
-"""Penalty of the augmented Lagrangian, in 1/h."""
+"""Default penalty for deviations from levels, in 1/h, also that of the augmented Lagrangian."""
 LEAST_PENALTY, LARGEST_PENALTY = 1e-6, 30.0
-"""Least penalty in the preconditioner, and largest penalty that is not taken as infinite, relative to the default."""
+"""Least penalty in the preconditioner, and largest penalty that does not count as infinite, relative to the default."""
 EQUAL_ROWS = 1e-6
-"""Difference below which rows of samples count as equal, so that different levels contradict each other."""
+"""Interpolation rows of samples that differ by less than this count as equal, so that different levels contradict each
+other."""
 
 
 @dataclass(frozen=True, eq=False)
 class GridIntegration(SolvesEach):
-    """Step 3 on a grid."""
+    """Step 3 on a grid: φ from the right-hand side b, in the shape of the grid."""
 
     grid: Grid
 
     @property
     def soft_weight(self) -> float:
-        """λ of `Soft` where none is given, in 1/length."""
+        """Default λ of `Soft`, in 1/length."""
         return PENALTY / float(self.grid.spacing.mean())
 
     def solve(self, divergence: Floats, source: GridSource) -> Floats:
-        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
+        """Return the φ that minimises ∫|∇φ − Y|², with mean zero at the samples: ``C φ = b`` (Eq. 13)."""
         phi = solve_poisson(divergence, self.grid.spacing, overwrite=True)
         phi -= np.average(source.at_samples(phi), weights=source.weights)
         return phi
 
     def fit(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Subtract φ's error at the samples, spread by diffusion as the normals were (in place of Eq. 14)."""
+        """Return φ near given levels at the samples: `solve` less its error there, spread by diffusion as normals are.
+
+        This replaces Eq. 14.
+        """
         phi = self.solve(divergence, source)
         excess = deviation(source.at_samples(phi), source, levels)
         phi -= diffused_mean(source, excess)
         return phi
 
     def penalize(self, divergence: Floats, source: GridSource, strength: float) -> Floats:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the areas; λ beyond `LARGEST_PENALTY` is exact."""
+        """Solve ``(C + λ Aᵀ W A) φ = b`` for λ = `strength` (Sec. 7.1, Fig. 11), with W the areas of samples.
+
+        λ beyond `LARGEST_PENALTY` counts as infinite.
+        """
         levels = Levels(np.zeros(len(source.weights)))
         if strength < LEAST_PENALTY**2 * self.soft_weight:
             return self.solve(divergence, source)
@@ -227,7 +250,7 @@ class GridIntegration(SolvesEach):
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Solve Eq. 14 by an augmented Lagrangian; the least correction at nodes near samples removes the rest."""
+        """Solve Eq. 14 by an augmented Lagrangian; the remaining error is removed by changes at nodes near samples."""
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
             self.grid.n_nodes,
@@ -280,7 +303,7 @@ class GridIntegration(SolvesEach):
 
 
 def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
-    """Return (s,) values at the samples minus their levels; with groups, also minus the mean of the group."""
+    """(s,) values at the samples minus their levels; with groups, also minus the weighted mean of the group."""
     excess = values - levels.values
     if levels.groups is not None:
         sums = np.bincount(levels.groups, source.weights * excess)
@@ -290,7 +313,7 @@ def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
 
 
 def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
-    """Return at each node the mean of values at samples, weighted by area and heat; the finest level is left out."""
+    """Return at each node the mean of (s,) values at samples, weighted by area and heat; the finest grid is skipped."""
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)
@@ -308,7 +331,7 @@ def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
 
 
 def least_correction(values: Floats, source: GridSource) -> Floats:
-    """Return (n_nodes,) the grid function of least norm that interpolates values at the samples, by least squares."""
+    """(n_nodes,) grid function of least norm that interpolates (s,) values at the samples, by least squares."""
     touched = np.unique(source.interpolation.indices)
     change = np.zeros(source.grid.n_nodes)
     columns = source.interpolation[:, touched]

@@ -1,4 +1,4 @@
-"""Level sets on grids: closed manifold surfaces in space, polylines in the plane; their points are given in cells.
+"""Level sets on grids: closed manifold surfaces in space, and polylines in the plane. Their points are in cells.
 
 On sparse grids marching cubes runs window by window, and vertices of neighbouring windows are merged. Tets in place of
 cubes would make three times as many triangles.
@@ -22,13 +22,16 @@ from .blocks import BLOCK, WINDOW, BlockValues
 measure: Any = lazy_module("skimage.measure", "contours")
 
 CAP = 0.01
-"""Distance, in cells, by which the walls that close a surface lie outside the box of the nodes."""
+"""Level sets that leave the box of the nodes are closed by walls this far outside of it, in cells."""
 LARGEST_VALUE = 1e30
-"""Bound of the numbers that marching cubes is given, and of their inverses: it computes in single precision."""
+"""Values for marching cubes, which computes in single precision, are kept between this and its inverse."""
 
 
 def closed_surface(values: Floats, spacing: Floats, level: float) -> tuple[Floats, Ints]:
-    """Extract the vertices and faces of a closed, manifold, outward surface by marching cubes."""
+    """Extract a level set of (nx, ny, nz) values as a closed, manifold surface that faces greater values.
+
+    Return (n, 3) vertices, in cells, and (m, 3) faces. Cells at nodes without a value, NaN, are outside.
+    """
     if values.ndim != 3:
         raise GeometryError(
             f"fields are contoured in 2 and 3 dimensions, and this grid has {values.ndim}", element="field"
@@ -50,22 +53,28 @@ def closed_surface(values: Floats, spacing: Floats, level: float) -> tuple[Float
 
 
 def zero_set(height: NDArray[np.floating], cells: Bools | None = None) -> tuple[Floats, Ints]:
-    """Return vertices, in cells, and faces of a zero set, towards greater values; of all cells unless some are given.
+    """Return (n, 3) vertices, in cells, and (m, 3) faces of the zero set, which face greater values, by marching cubes.
 
-    Each cell is given at its last node.
+    If `cells` are given, which is True at the last node of each chosen cell, only those are used.
     """
     vertices, faces, _, _ = measure.marching_cubes(height, 0.0, gradient_direction="descent", mask=cells)
     return vertices.astype(np.float64), faces.astype(np.int64)
 
 
 def level_lines(values: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
-    """Return points (k, 2) of each line of a level set, greater values to the left, and whether it closes."""
+    """Return the (k, 2) points, in cells, of each line of a level set in the plane, and whether the line is closed.
+
+    Greater values are to the left of lines.
+    """
     lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     return [(line, len(line) > 3 and bool((line[0] == line[-1]).all())) for line in lines]
 
 
 def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
-    """Return values minus the level, kept away from zero so that crossings respect `CLEARANCE`."""
+    """Return values minus the level, kept away from zero so that crossings respect `CLEARANCE`.
+
+    Raise `OutsideError` if all are on one side.
+    """
     height = values - level
     finite = height[np.isfinite(height)]
     if not len(finite):
@@ -91,7 +100,10 @@ def _clear_of_zero(height: NDArray[np.floating], spacing: Floats) -> None:
 
 
 def closed_without_values(height: Floats) -> Floats:
-    """Make nodes without a value positive, so that crossings lie about `CAP` cells from neighbours with a value."""
+    """Return values in which NaN is replaced by positive numbers, so that the zero set is closed there.
+
+    Crossings lie about `CAP` cells from neighbours with a value.
+    """
     unknown = np.isnan(height)
     if not unknown.any():
         return height
@@ -111,11 +123,14 @@ def values_at_walls(values: NDArray[Any]) -> NDArray[Any]:
 
 
 INDEX_BITS = 20
-"""Bits of the index of a node along an axis."""
+"""Number of bits of a node's index along an axis, in keys of edges."""
 
 
 def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Iterator[tuple[Ints, Floats, Ints]]:
-    """Yield, in order, the place of each window of blocks that the level set crosses, and vertices and faces there."""
+    """Yield the part of a level set in each window of blocks that it crosses, in order of windows.
+
+    That is the (3,) indices of the window, (n, 3) vertices, in cells, and (m, 3) faces.
+    """
     capped = _reaches_walls(values, level)
     for window in np.unique(values.blocks.places // WINDOW, axis=0).astype(np.int64):
         first = window * WINDOW * BLOCK
@@ -134,7 +149,7 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
 
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, Ints] | None:
-    """Return vertices, in cells, and faces of the zero set where all nodes of a cell have values; None if empty."""
+    """Return vertices, in cells, and faces of the zero set in cells whose nodes all have values; None if empty."""
     finite = ~np.isnan(height)
     whole = np.zeros(height.shape, dtype=bool)  # each cell is marked at its last node
     inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)
@@ -153,7 +168,7 @@ def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, Ints] | None:
 
 
 def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
-    """Return (n,) whether vertices, in cells, lie on edges of the grid, and numbers that are equal on one edge."""
+    """(n,) whether (n, 3) vertices, in cells, lie on edges of the grid, and (n,) keys that identify these edges."""
     base = np.floor(vertices)
     crossed = vertices > base
     on_edge = crossed.sum(axis=1) == 1
@@ -173,7 +188,10 @@ def _reaches_walls(values: BlockValues, level: float) -> bool:
 
 
 def _close_at_walls(height: NDArray[Any], first: Ints, limit: Ints) -> None:
-    """Make the layer of nodes beyond the walls positive, so that crossings lie `CAP` cells beyond the walls."""
+    """Write positive values to the layer of nodes beyond the walls, so that crossings lie `CAP` cells beyond the walls.
+
+    `height` begins at node `first` of a grid of `limit` nodes.
+    """
     for axis in range(3):
         for beyond, wall in ((-1, 0), (int(limit[axis]), int(limit[axis]) - 1)):
             target, source = beyond - int(first[axis]), wall - int(first[axis])
@@ -184,13 +202,13 @@ def _close_at_walls(height: NDArray[Any], first: Ints, limit: Ints) -> None:
 
 
 Part = tuple[Floats, Ints]
-"""Vertices (n, 3) and faces (m, 3); vertex ids count on from those of the parts before."""
+"""(n, 3) vertices and (m, 3) faces; vertex ids count on from those of the previous parts."""
 _Seam = tuple[Ints, Ints]
-"""Keys of the vertices on the walls of a window, ascending, and the numbers of these vertices."""
+"""Keys of the edges of the vertices on the walls of a window, ascending, and the ids of these vertices."""
 
 
 def contour_parts(values: BlockValues, spacing: Floats, level: float) -> Iterator[Part]:
-    """Yield new vertices, and faces of new and old ones, window by window, of the level set in cells with values.
+    """Yield the level set, in cells whose nodes have values, as parts: new vertices, and faces of new and earlier ones.
 
     It faces greater values, and is closed `CAP` cells outside the grid.
     """
@@ -200,19 +218,19 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float) -> Iterato
         on_edge, keys = edges_of(points)
         on_wall = (points % (WINDOW * BLOCK) == 0).any(axis=1)
         shared = np.flatnonzero(on_edge & on_wall)
-        numbers = np.full(len(points), -1, dtype=np.int64)
+        ids = np.full(len(points), -1, dtype=np.int64)
         for step in np.ndindex(3, 3, 3):
             if seam := seams.get(tuple((window + step - 1).tolist())):
-                known = np.append(seam[1], -1)[places_among(seam[0], keys[shared])]
-                numbers[shared] = np.maximum(numbers[shared], known)
-        new = numbers < 0
-        numbers[new] = count + np.arange(int(new.sum()))
+                known_ids = np.append(seam[1], -1)[places_among(seam[0], keys[shared])]
+                ids[shared] = np.maximum(ids[shared], known_ids)
+        new = ids < 0
+        ids[new] = count + np.arange(int(new.sum()))
         count += int(new.sum())
         order = shared[np.argsort(keys[shared])]
-        seams[tuple(window.tolist())] = keys[order], numbers[order]
+        seams[tuple(window.tolist())] = keys[order], ids[order]
         for passed in [place for place in seams if place[0] < window[0] - 1]:
             del seams[passed]
-        yield points[new], numbers[triangles]
+        yield points[new], ids[triangles]
     if not count:
         raise OutsideError(
             f"the values of the band do not take level {level:g}", remedy="choose another level or a wider band"

@@ -11,10 +11,10 @@ grid), continues it at an eighth of the cost in space. So every level is swept o
 the coarsest level everywhere.
 
 A coarser level starts from the values that the finer one found within its band: the directions of X, with lengths
-raised to the power that turns the decay rate of the finer level into its own, so that a path from the source to a node
-has the same weight wherever it leaves the band. Where a level is skipped, its sources are restricted to the next by the
-transpose of linear interpolation, which keeps sums and first moments: the two sides of a sheet thinner than a coarse
-cell do not cancel.
+raised to the power that converts the decay rate of the finer level into its own, so that a path from the source to a
+node has the same weight wherever it leaves the band. If a level is skipped, its sources are restricted to the next by
+the transpose of linear interpolation. This keeps sums and first moments, so that the two sides of a sheet thinner than
+a coarse cell do not cancel.
 """
 
 from __future__ import annotations
@@ -39,15 +39,16 @@ from .stencil import FEW_NODES, by_slabs, slab
 BAND = 14.0
 """Half width, in √t, of the band around the source in which a level is swept."""
 RIM_WIDTH = 3
-"""Width, in nodes, of the rim of the band that takes its values from the coarser level."""
+"""Width, in nodes, of the outer part of the band whose values are replaced by those of the coarser level."""
 SMALL_BAND = 0.125
-"""Share of the grid below which a band without values of a finer level is swept twice as often: it costs little."""
+"""A band of less than this share of the grid, without values of a finer level, is swept twice as often, which costs
+little."""
 COARSEST_NODES = 32
-"""Number of nodes along every axis up to which a grid is not coarsened."""
+"""Grids with at most this number of nodes along every axis are not coarsened."""
 UNHALVED_NODES = 4
-"""Number of nodes up to which an axis is not halved."""
+"""Axes with at most this number of nodes are not halved."""
 COARSEST_ROUNDS = 12
-"""Number of rounds on the coarsest grid, where paths from the source are longer and sweeps are cheap."""
+"""Number of rounds of sweeps on the coarsest grid, where paths from the source are longer, and sweeps are cheap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,21 +56,21 @@ class Level:
     """The diffused vectors on one grid of the hierarchy."""
 
     vectors: NDArray[np.float32] | None  # (l₀, l₁, l₂, n, 4) X within the band; None if skipped
-    inside: Bools | None  # (l₀, l₁, l₂, stretches) where these values are valid, and not those of the coarser level
+    inside: Bools | None  # (l₀, l₁, l₂, stretches) where these values are used, and not those of the coarser level
     factors: Ints  # (4,) cells of this grid per cell of the next coarser one: see `coarsening`
 
 
 Guess = tuple[NDArray[np.float32], Bools]
-"""X on a level, taken from a finer one, and the stretches in which it is known, which are not swept."""
+"""(l₀, l₁, l₂, n, 4) X on a level, from a finer one, and (l₀, l₁, l₂, stretches) where it is known and not swept."""
 
 
 def diffuse_multilevel(
     sources: NodeSources, time: Callable[[float], float], finest: int = 0, rounds: int = 2
 ) -> list[Level]:
-    """Solve ``(1 − tΔ) X = B``, Eq. 12, on levels from `finest` on; `time` gives t for a mean spacing.
+    """Solve ``(1 − tΔ) X = B``, Eq. 12, on all levels, the finest first; the first `finest` levels are skipped.
 
-    Each level is swept in all combinations of directions: `rounds` times, twice as often if it starts from values of
-    a finer level, and `COARSEST_ROUNDS` times if it is the coarsest.
+    `time` returns t for a mean spacing. Each level is swept in all combinations of directions: `rounds` times, twice as
+    often if it starts from values of a finer level, and `COARSEST_ROUNDS` times if it is the coarsest.
     """
     levels: list[Level] = []
     guess = None
@@ -92,7 +93,10 @@ def diffuse_multilevel(
 
 
 def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
-    """Return (4,) cells of a grid per cell of the next coarser one; axes shorter than others' spacing get one node."""
+    """(4,) numbers of cells of a grid per cell of the next coarser one, 1 along axes that are not coarsened.
+
+    Axes that are no longer than the spacing along others are reduced to one node.
+    """
     counts = np.array(shape)
     factors = np.ones(4, dtype=np.int64)
     wide = counts > UNHALVED_NODES
@@ -105,7 +109,7 @@ def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
 
 
 def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[list[Level], tuple[int, ...], Floats]:
-    """Return the first `finest` levels of the hierarchy, without vectors; and shape and spacing of the next grid."""
+    """Return the first `finest` levels of the hierarchy, without vectors, and shape and spacing of the next grid."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))
@@ -116,11 +120,14 @@ def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[lis
 def _diffuse_level(
     sources: NodeSources, guess: Guess | None, time: Callable[[float], float], factors: Ints, rounds: int, last: bool
 ) -> Level:
-    """Solve on one level, within the band around its sources or known values, or everywhere on the last."""
+    """Solve on one level, within the band around its sources or known values, or everywhere if it is the last.
+
+    `factors` are those of `coarsening`, and `rounds` of `diffuse_multilevel`.
+    """
     t = time(_mean_step(sources.steps))
     real = sources.steps > 0
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
-    given, known = (None, None) if guess is None else guess
+    given_vectors, known = (None, None) if guess is None else guess
     start = sources.places >= 0 if known is None else known
     if last:
         active = inside = np.ones_like(start)
@@ -132,16 +139,17 @@ def _diffuse_level(
         active = active & ~known
     elif not last and active.mean() < SMALL_BAND:
         rounds *= 2
-    vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given)
+    vectors = diffuse_by_sweeps(sources, active, ratios, rounds, given_vectors)
     return Level(vectors, inside, factors)
 
 
 def _mean_step(steps: Floats) -> float:
+    """Return the mean spacing over the axes that have more than one node."""
     return float(steps[steps > 0].mean())
 
 
 def _dilated(mask: Bools, width: Ints) -> Bools:
-    """Dilate a mask by a box of this half width, in nodes."""
+    """Dilate a mask of stretches, (l₀, l₁, l₂, stretches), by a box of half `width`, (4,), in nodes."""
     grown = mask.astype(np.uint8)
     for axis, reach in enumerate((*width[:3], -(-int(width[3]) // STRETCH))):
         size = 2 * min(int(reach), mask.shape[axis]) + 1
@@ -150,7 +158,7 @@ def _dilated(mask: Bools, width: Ints) -> Bools:
 
 
 def _coarser(shape: tuple[int, ...], steps: Floats) -> tuple[tuple[int, ...], Floats]:
-    """Return shape and spacing of the next coarser grid."""
+    """Return the shape and the (4,) spacing of the next coarser grid; spacing is 0 along axes of one node."""
     factors = coarsening(shape, steps)
     coarse = _coarse_shape(shape, factors)
     return coarse, np.where(np.array(coarse) > 1, steps * factors, 0.0)
@@ -162,7 +170,10 @@ def _coarse_shape(shape: tuple[int, ...], factors: Ints) -> tuple[int, ...]:
 
 
 def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
-    """Return a level's values for the next coarser one, and the stretches that are complete; None if none is."""
+    """Return the values of a level at the nodes of the next coarser one, and where stretches are complete, or None.
+
+    Lengths are raised to `power`.
+    """
     assert level.vectors is not None and level.inside is not None
     vectors = untouched_zeros((*shape, 4), np.float32)
     counts = np.zeros((*shape[:3], -(-shape[3] // STRETCH)), dtype=np.int64)
@@ -176,7 +187,11 @@ def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None
 def collapse(
     levels: list[Level], shape: tuple[int, ...], components: int, extract: Callable[..., None]
 ) -> NDArray[np.float32]:
-    """Return (components, *shape) ``extract(vectors, inside, out, …)`` of X on the finest level valid at each node."""
+    """Return (components, *shape) values on the finest grid, from the finest level that is used at each node.
+
+    ``extract(vectors, inside, out, axis, start, stop)`` computes them from X in a slab of a level, see `unit_vectors`.
+    Between the nodes of coarser levels they are interpolated.
+    """
     shapes = [tuple(shape)]
     for level in levels[:-1]:
         shapes.append(_coarse_shape(shapes[-1], level.factors))
@@ -195,7 +210,7 @@ def collapse(
 
 
 LEAST_KNOWN = np.float32(1e-34)
-"""Size below which values count as unknown, and are taken from a coarser level."""
+"""Vectors smaller than this count as unknown, and are replaced by those of a coarser level."""
 
 
 @compiled
@@ -207,7 +222,10 @@ def _carry(
     coarse: NDArray[np.float32],
     counts: NDArray[np.integer],
 ) -> None:
-    """Copy vectors at nodes that the coarse grid shares, lengths raised to a power; count known nodes by stretch."""
+    """Copy vectors at nodes that the coarse grid shares to `coarse`, with lengths raised to a power.
+
+    Add the number of known nodes in each stretch of the coarse grid to `counts`.
+    """
     n0, n1, n2, n3 = vectors.shape[:4]
     for i in range(0, n0, 2 if factors[0] == 2 else 1):
         for j in range(0, n1, 2 if factors[1] == 2 else 1):
@@ -231,7 +249,10 @@ def _carry(
 def _interpolate(
     coarse: NDArray[np.float32], factors: Ints, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
-    """Interpolate the values of a coarser grid to all nodes, linearly along every axis that was coarsened."""
+    """Interpolate values of a coarser grid, (q, a, b, c, d), to the nodes of a slab of `out`, the finer grid.
+
+    It is linear along axes that were halved, and constant along those that were reduced to one node.
+    """
     _, n0, n1, n2, n = out.shape
     row = np.empty(coarse.shape[4], dtype=np.float32)
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
@@ -267,7 +288,10 @@ def _interpolate(
 def unit_vectors(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
-    """Scale the vectors to length one; where they have underflowed, `out` keeps the values of a coarser level."""
+    """Write the vectors of a slab, scaled to length 1, to `out`; where they have underflowed, it keeps its values.
+
+    Those are of a coarser level. `out` is (d, *shape).
+    """
     window = slab(axis, start, stop)
     components = np.moveaxis(vectors[window], -1, 0)
     sizes = np.abs(components[0])
@@ -284,7 +308,7 @@ def unit_vectors(
 def quotients(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
-    """Divide the second component by the first; `out` keeps its values where the first has underflowed."""
+    """Write second components of vectors over the first to a slab of `out`; it keeps its values at underflow."""
     window = slab(axis, start, stop)
     first, second = vectors[window][..., 0], vectors[window][..., 1]
     known = _nodes_of(inside[window], first.shape[3]) & (first > LEAST_KNOWN)
@@ -292,7 +316,7 @@ def quotients(
 
 
 def _nodes_of(stretches: Bools, n: int) -> Bools:
-    """Repeat the values of the stretches of lines for each of the n nodes along a line."""
+    """(…, n) values of the nodes along lines, from those of their stretches, (…, stretches)."""
     return np.repeat(stretches, STRETCH, axis=3)[..., :n]
 
 
@@ -301,7 +325,8 @@ def diffuse_by_sweeps(
 ) -> NDArray[np.float32]:
     """Solve ``(1 + Σ_axes a · neighbours) X_i = B_i + Σ_axes a Σ X_j``, Eq. 12, in `active` stretches, a = t / h².
 
-    Elsewhere X (l₀, l₁, l₂, n, 4) is as in `given`, which is overwritten; by default zero, in memory never touched.
+    Return (l₀, l₁, l₂, n, 4) X. Elsewhere it is as in `given`, which is overwritten, and by default zero, in memory
+    that is never touched. `ratios` are the (4,) values of a.
     """
     shape = sources.shape
     vectors = untouched_zeros((*shape, 4), np.float32) if given is None else given
@@ -315,7 +340,10 @@ def diffuse_by_sweeps(
 
 
 def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int, *arguments: Any) -> None:
-    """Run ``kernel(*arguments, tiles)`` over all lines in all directions; tiles on a diagonal are independent."""
+    """Run ``kernel(*arguments, tiles)`` over all lines of a grid, in all combinations of directions, `rounds` times.
+
+    Tiles on a diagonal are independent of each other, and run in threads.
+    """
     steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
     threads = 1 if np.prod(shape) < FEW_NODES else n_threads()
     size = [
@@ -333,7 +361,10 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
 
 
 def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ...]) -> list[list[list[int]]]:
-    """Return tiles of a plane of lines, in groups whose tiles can run at the same time."""
+    """Divide a plane of lines into tiles of `size`, in groups whose tiles can run at the same time, in order.
+
+    A tile is a list of start, stop and step along both axes; `direction` is 1 or −1 along each.
+    """
     starts = [range(0, n, s)[::step] for n, s, step in zip(shape, size, direction, strict=True)]
     waves: list[list[list[int]]] = [[] for _ in range(len(starts[0]) + len(starts[1]) - 1)]
     for a, first in enumerate(starts[0]):
@@ -347,7 +378,10 @@ def wavefronts(shape: tuple[int, ...], size: list[int], direction: tuple[int, ..
 
 
 def line_pivots(shape: tuple[int, ...], ratios: Floats) -> NDArray[np.float32]:
-    """Return (8, n) reciprocal pivots of lines' tridiagonal matrix; row bit k is set for lines at a wall of axis k."""
+    """(8, n) reciprocal pivots of the tridiagonal matrices of lines along the last axis.
+
+    Bit k of the row is set for lines at a wall of axis k. `ratios` are (4,) values of t / h².
+    """
     n = shape[3]
     along = np.full(n, 2.0)
     along[0] = along[-1] = 1.0
@@ -372,7 +406,11 @@ def _sweep_tiles(
     pivots: NDArray[np.float32],
     tiles: Ints,
 ) -> None:
-    """Update the lines of tiles in order, four components at once; slices of lines help the compiler to vectorise."""
+    """Solve for the vectors on the lines of tiles, one line after the other, given those on neighbouring lines.
+
+    Arrays are those of `diffuse_by_sweeps`, with one row for each line. Four components are updated at once; slices of
+    lines help the compiler to vectorise.
+    """
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios
     scratch = np.empty(4 * n, dtype=np.float32)

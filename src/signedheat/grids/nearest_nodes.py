@@ -1,8 +1,8 @@
 """The nearest faces of the nodes of a grid, with one search for each block of nodes.
 
-For places q and y of the surface and nodes x of a box, ``|x − y|² − |x − q|²`` is linear in x: if it is positive at the
-corner of the box that favours y, no node of the box has y as its nearest place. Few faces remain for a block, and fewer
-for each eighth of it, down to single nodes.
+For points q and y of the surface and nodes x of a box, ``|x − y|² − |x − q|²`` is linear in x. If it is positive at the
+corner of the box that favours y, then y is not the nearest point of any node of the box. Few faces remain for a block,
+and fewer for each eighth of it, down to single nodes.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ class Lattice(NamedTuple):
 
 
 SQUARE_ROUNDING = 1e-12
-"""Relative rounding error of squares."""
+"""Relative rounding error of squared distances."""
 EIGHTHS = np.stack([np.arange(8) >> 2, np.arange(8) >> 1 & 1, np.arange(8) & 1])
-"""(3, 8) offsets of the eighths of a cube."""
+"""(3, 8) offsets of the eighths of a cube, 0 or 1 along each axis."""
 CROWDED_LEAVES = 1500
-"""Number of candidate leaves above which the nodes of a block are searched one by one."""
+"""A block with more candidate leaves of the tree than this is crowded: its nodes are searched for one by one."""
 ALONG_A_CURVE = np.stack(
     [sum((np.arange(BLOCK**3) >> (3 * bit + 2 - axis) & 1) << bit for bit in range(3)) for axis in range(3)], axis=1
 )
@@ -41,9 +41,9 @@ ALONG_A_CURVE = np.stack(
 
 
 def nearest_at_nodes(tree: FaceTree, lattice: Lattice, first: Ints, places: Ints) -> tuple[Floats, NDArray[np.int32]]:
-    """Return (a, b, c) squared distances and nearest faces of the nodes from `first` on, in blocks at (n, 3) places.
+    """Return (a, b, c) squared distances and nearest faces of the nodes of blocks, from node `first` on.
 
-    At nodes that are in no block they are NaN and −1.
+    `places` are the (n, 3) indices of blocks. At nodes that are in none of them, values are NaN and −1.
     """
     origin, steps, limits = lattice
     shape = tuple(np.minimum((places.max(axis=0) + 1) * BLOCK, limits) - first)
@@ -77,7 +77,12 @@ def _fill(
     out_squares: Floats,
     out_faces: NDArray[np.int32],
 ) -> Bools:
-    """Write nearest faces and squared distances of nodes; return which blocks are too crowded. `eighths`: `EIGHTHS`."""
+    """Write squared distances and nearest faces of the nodes of blocks; return (n,) which blocks are too crowded.
+
+    Blocks begin at (n, 3) nodes `firsts`, and `start`, (n,), are faces near their centres. `rows`, `bounds`, `discs`
+    and `items` are those of the search tree; `origin`, `steps` and `limits` those of the lattice. The arrays to write
+    to, (a, b, c), begin at node `window`. `eighths` is `EIGHTHS`.
+    """
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = BOXES_PER_LEAF * min(CROWDED_LEAVES, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
@@ -133,7 +138,11 @@ def _fill(
 def _nearest(
     rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
-    """Write squared distances and vectors from all faces to places (`away`), and the nearest face with its square."""
+    """Find the nearest of `count` faces for each of (3, e) places.
+
+    Write the squared distances and vectors from all faces to `away`, (count, 4, e), and the least square and the index
+    of its face to `best` and `which`, (e,).
+    """
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):
@@ -155,7 +164,11 @@ def _divide(
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """Write the faces that can be nearest in each of eight boxes: squared distance is above its tangent planes."""
+    """Write the faces that can be nearest in each of eight boxes with half widths `half` to `out`, and their numbers.
+
+    `away`, `best` and `which` are what `_nearest` found for the centres of the boxes. The bound holds since squared
+    distance lies above its tangent planes.
+    """
     ways, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
     for e in range(len(best)):
         counts[e] = 0
@@ -178,7 +191,10 @@ def _divide(
 
 @compiled
 def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out: Ints) -> int:
-    """Write the leaves that can be nearest to a node of a box; return their number, or one more than have room."""
+    """Write the leaves that can be nearest to a node of a box to `out`; return their number, or one more than it holds.
+
+    `box`, (9,), has the centre, the half widths and the nearest point of the centre.
+    """
     leaves = len(bounds) // 2
     kept, depth = 0, 1
     stack[0] = 1
@@ -199,10 +215,10 @@ def _leaves_of_tree(bounds: Floats, discs: Floats, box: Floats, stack: Ints, out
 
 @compiled
 def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bool:
-    """Whether a place y in the bounds of a tree's node can be as near to some x of a box as the foot q of its centre.
+    """Whether a point y in the bounds of a tree's node can be as near to some x of a box as q, nearest to its centre.
 
     ``|x − y|² − |x − q|²`` at the worst x is the sum over axes of ``y² − q² − 2 e |y − q|``, where e is half the width
-    of the box; it is least at ±e, at q or at an end of the bounds.
+    of the box. It is least at ±e, at q or at an end of the bounds.
     """
     total, scale = 0.0, 0.0
     for d in range(3):

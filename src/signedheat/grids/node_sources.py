@@ -20,10 +20,10 @@ STRETCH = 8
 
 
 class NodeSources(NamedTuple):
-    """Vectors at the nodes of a grid."""
+    """Vectors at the nodes of a grid, which has four axes; in fewer dimensions the first ones have one node."""
 
-    # (l₀, l₁, l₂, ⌈n / STRETCH⌉) row of `sums` for each stretch of the lines along the last axis of the grid, padded to
-    # four axes in front; −1 where all vectors are zero
+    # (l₀, l₁, l₂, ⌈n / STRETCH⌉) row of `sums` for each stretch of the lines along the last axis of the grid; −1 where
+    # all vectors are zero
     places: NDArray[np.int32]
     sums: NDArray[np.float32]  # (k, STRETCH, 4) the vectors, padded to four components
     shape: tuple[int, ...]  # nodes along each axis
@@ -39,7 +39,7 @@ class NodeSources(NamedTuple):
     def scattered(
         cls, shape: tuple[int, ...], steps: Floats, nodes: Ints, weights: Floats, values: NDArray[np.floating]
     ) -> NodeSources:
-        """Add values (s, c ≤ 4) to the `nodes` (s, k) of a grid with `weights` (s, k)."""
+        """Add (s, c) values, c ≤ 4, to the (s, k) `nodes` of a grid, numbered in C order, with (s, k) `weights`."""
         used = weights > 0
         lines, offsets = np.divmod(nodes[used], shape[3])
         empty = cls.empty(shape, steps)
@@ -56,13 +56,13 @@ class NodeSources(NamedTuple):
         return cls(empty.places, sums.reshape(-1, STRETCH, 4), shape, steps)
 
     def restricted(self, factors: Ints, shape: tuple[int, ...], steps: Floats) -> NodeSources:
-        """Restrict the sources to a coarser grid, by the transpose of linear interpolation."""
+        """Restrict the sources to a coarser grid, by the transpose of linear interpolation; `factors`: `coarsening`."""
         nodes, values = self.nonzero()
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)
         return NodeSources.scattered(shape, steps, *interpolation_stencil(coarse, shape), values)
 
     def nonzero(self) -> tuple[Ints, NDArray[np.float32]]:
-        """Return (k, 4) nodes whose vectors are not zero, and (k, 4) these vectors."""
+        """(k, 4) indices of the nodes whose vectors are not zero, and (k, 4) these vectors."""
         stored = self.places >= 0
         stretches, vectors = np.argwhere(stored), self.sums[self.places[stored]]
         rows, offsets = np.nonzero(vectors.any(axis=2))
@@ -76,9 +76,10 @@ def merge_in_cells(
 ) -> tuple[tuple[Floats, Floats, Floats, Ints], NodeSources]:
     """Merge simplices to one sample for each cell of a grid and each component; add their vectors to the nodes.
 
-    Simplices are corners (m, c, d) in cells, vectors, weights and components, split into parts at most `size` cells
-    long; the grid has `shape` nodes. Return positions, vectors, weights and components of the samples; and the sources
-    with all vectors, divided by `scale` and shared among nodes by multilinear weights.
+    Simplices are (m, c, d) corners in cells, (m, d) vectors, (m,) weights and (m,) components. They are split into
+    parts at most `size` cells long. The grid has `shape` nodes. Return positions, vectors, weights and components of
+    the s samples; and `sources` with all vectors added, divided by `scale` and shared among nodes by multilinear
+    weights.
     """
     corners, vectors, weights, components = simplices
     order = np.argsort(components, kind="stable")
@@ -106,7 +107,11 @@ def _merge(
     sources: NodeSources,
     scale: float,
 ) -> tuple[Floats, Ints, NDArray[np.float32]]:
-    """Return sums of weight · position, vector and weight by component and cell, the components, and node sums."""
+    """Do the work of `merge_in_cells`, simplex by simplex in `order`, by component.
+
+    Return (s, 2 d + 1) sums of weight · position, vector and weight by component and cell, their (s,) components, and
+    `sums` of the sources. `slots` are zeros, one for each cell.
+    """
     nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256

@@ -26,9 +26,9 @@ else:
 class Polyline(Displayed, Frozen):
     """Points in the plane, joined in order by straight segments.
 
-    `signed_distance` is negative inside what polylines bound, whichever way they run, and positive to the left of those
-    that bound nothing. With ``as_oriented=True``, and by `SignedHeatSolver`, it is positive to the left of all: inside
-    a closed polyline that runs clockwise it is negative.
+    `signed_distance` is negative in regions that polylines bound, whichever way they run, and positive to the left of
+    those that bound nothing. With ``as_oriented=True``, and by `SignedHeatSolver`, it is positive to the left of all
+    polylines: inside a closed polyline that runs clockwise it is negative.
 
     Parameters
     ----------
@@ -72,10 +72,10 @@ class Polyline(Displayed, Frozen):
 
     @classmethod
     def from_mask(cls, mask: ArrayLike, origin: ArrayLike = (0.0, 0.0), spacing: ArrayLike = 1.0) -> list[Polyline]:
-        """Trace the boundary of the True region of a boolean image, with φ < 0 inside.
+        """Trace the boundary of the True region of a boolean image, so that distance is negative inside.
 
-        Lines pass halfway between pixels with different values. An image whose rows run downwards is brought into the
-        order [x, y] by ``image[::-1].T``.
+        Lines pass halfway between pixels with different values. For an image whose rows run downwards, pass
+        ``image[::-1].T``, which is in the order [x, y].
 
         Parameters
         ----------
@@ -87,7 +87,7 @@ class Polyline(Displayed, Frozen):
         Returns
         -------
         list of Polyline
-            Closed lines, the region to their right.
+            Closed lines, with the region to their right.
 
         Raises
         ------
@@ -151,12 +151,12 @@ class Polyline(Displayed, Frozen):
         return float(0.5 * (x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
 
     def reversed(self) -> Polyline:
-        """Return the polyline in opposite direction, for which φ has the opposite sign.
+        """Return the polyline in the opposite direction, which exchanges left and right.
 
         Returns
         -------
         Polyline
-            With the same points from last to first.
+            The same points, from last to first.
 
         See Also
         --------

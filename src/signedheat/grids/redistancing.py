@@ -1,11 +1,11 @@
-"""Signed distance to the zero set of an array: a smooth one, one with edges, or one of mere signs; sharpening on grids.
+"""Signed distance to the zero set of an array, whether it is smooth, has edges, or is known by signs only; sharpening.
 
 The zero set is the contour of values that are linear along the edges of the grid, and distance is measured to its
-triangles. A crossing of the contour with an edge is smooth where neighbouring crossings lie on the paraboloid that
-touches the zero set there: around smooth crossings distance is measured to the touching circle.
+triangles. A crossing of the contour with an edge is smooth if neighbouring crossings lie on the paraboloid that touches
+the zero set there. Around smooth crossings distance is measured to the touching circle.
 
-Internally arrays have four axes and vectors four components, of which the first are unused in fewer dimensions;
-positions are in units of length from the grid's origin.
+Internally arrays have four axes and vectors four components. In fewer dimensions, the first are not used. Positions are
+in units of length from the grid's origin.
 """
 
 from __future__ import annotations
@@ -41,18 +41,18 @@ from .stencil import padded_shape
 def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | Sequence[bool] = False) -> Floats:
     """Compute the signed distance of the nodes of a grid to the zero set of an array of values, or of signs.
 
-    Where the zero set is smooth, distance is of second order, and exact for planes and spheres; at its edges it is
-    that to the contour of values that are linear between nodes. An array of two opposite values tells only the side of
-    each node: of the contours that separate the two sides, a smooth one is used.
+    Where the zero set is smooth, the error is of second order, and zero for planes and spheres. At its edges, distance
+    is to the contour of values that are linear between nodes. An array of two opposite values tells only the side of
+    each node. Then a smooth contour that separates the two sides is used.
 
     Parameters
     ----------
     values : array with one to four axes
-        Positive on one side, negative on the other; zero is on the zero set.
+        Values at the nodes of a grid: positive on one side, negative on the other, and 0 on the zero set.
     spacing : float, or one for each axis
-        Distance between neighbouring nodes.
+        Distance between neighbouring nodes, in units of length.
     periodic : bool, or one for each axis
-        Axes along which the first node follows the last one again.
+        Whether the first node follows the last one along an axis.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
     See Also
     --------
-    sharpen : The same for a field.
+    sharpen : Replace a field by distance to its zero set.
 
     Examples
     --------
@@ -120,7 +120,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
 @sharpen_on.register
 def _(grid: Grid, field: Field[Grid], source: object, method: Method | None, progress: Progress | None) -> Field[Grid]:
-    """Measure the distance of every node to the zero set; a field with its solid holds it already, up to a factor."""
+    """Measure the distance of every node to the zero set. A field that holds its solid is returned, up to a factor."""
     if source is not None or method is not None:
         raise UnsupportedTypeError(
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
@@ -156,7 +156,10 @@ def _(
 
 
 def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
-    """Return unsigned distances of the nodes that are not padding; every axis has at least two nodes."""
+    """Return unsigned distances of the nodes that are not padding, `pads` along each axis, to the zero set.
+
+    Every axis has at least two nodes.
+    """
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:
         values = smoothed_signs(values)
@@ -180,63 +183,66 @@ SIGN_BLUR = 1.0
 """Standard deviation, in cells, of the Gaussian that smooths arrays of signs. Distances of balls, half spaces and boxes
 24 to 96 nodes wide are best with 0.7 to 1; more rounds the edges of boxes."""
 LEAST_SIGN = 0.3
-"""Smoothed signs are between this and twice as much, with which contours cross the middle third of an edge: signs
-contain no more. With the middle three fifths balls and half spaces come out a tenth better, and boxes a tenth worse."""
+"""Absolute values of smoothed signs are between this and twice as much, so that contours cross the middle third of an
+edge, since signs tell no more. With the middle three fifths balls and half spaces come out a tenth better, and boxes a
+tenth worse."""
 SMOOTH_CROSSING = 0.05
-"""Distance, in cells, from the neighbours' paraboloids up to which a crossing is smooth. Distances of balls of four
+"""A crossing is smooth if its neighbours are at most this far from its paraboloid, in cells. Distances of balls of four
 cells' radius are wrong by at most 0.04 cells, with 0.1 by 0.01; those of clipped balls by 0.07 and 0.12."""
 
 FLAT_RADIUS = 0.25
-"""Radius around a crossing, relative to a cell's diagonal, within which the zero set of signs with four axes is
-flat. Distances of balls and half spaces 13 to 17 nodes wide are best with 0.125 to 0.25, those of boxes with more."""
+"""The zero set of signs with four axes is a flat disc with this radius around each crossing, relative to a cell's
+diagonal. Distances of balls and half spaces 13 to 17 nodes wide are best with 0.125 to 0.25, those of boxes with more.
+"""
 
 
 Measured: TypeAlias = Callable[[Ints, Ints, Floats], Floats]
-"""A function of the first node of a tile, of that beyond its last, and of its (n, 4) nodes: returns (n,) distances."""
+"""A function that returns (n,) distances of the nodes of a tile, given its first node, the node beyond its last, and
+the (n, 4) positions of its nodes."""
 TILE_NODES = (4 * BLOCK) ** 3
 """Approximate number of nodes that a thread measures at a time."""
 
 
 class Crossings(NamedTuple):
-    """Places on the zero set of the cubic interpolant near crossed edges, with its normals and curvatures there."""
+    """Points of the zero set of the cubic interpolant near crossed edges, with its normals and curvatures there."""
 
-    places: Floats  # (c, 4)
-    normals: Floats  # (c, 4) unit vectors
+    places: Floats  # (c, 4) positions
+    normals: Floats  # (c, 4) unit normals
     bends: Floats  # (c, 4, 4) symmetric shape operators
 
     def heights(self, chosen: Ints, away: Floats) -> Floats:
-        """Return (n,) heights, over the tangent planes of (n,) crossings, of places that are (n, 4) away from them."""
+        """(n,) heights of points over the tangent planes at (n,) chosen crossings, given (n, 4) vectors from these."""
         return np.einsum("ni,ni->n", away, self.normals[chosen])
 
     def bend_along(self, chosen: Ints, across: Floats) -> Floats:
-        """Return (n,) curvatures of the zero set at (n,) crossings along (n, 4) vectors, times squared lengths."""
+        """(n,) curvatures of the zero set at (n,) chosen crossings along (n, 4) vectors, times squared lengths."""
         return np.einsum("ni,nij,nj->n", across, self.bends[chosen], across)
 
 
 class Contour(NamedTuple):
     """The zero set of an array."""
 
-    # (v, 3) along axes 1 to 3, and (m, 3): the contour of values that are linear along edges; empty with four axes
-    vertices: Floats
-    faces: Ints
+    # the contour of values that are linear along edges; empty with four axes
+    vertices: Floats  # (v, 3) along axes 1 to 3
+    faces: Ints  # (m, 3)
     numbers: Ints  # (v,) the crossing at each vertex; −1 at vertices on no edge of the array
     zeros: Floats  # (k, 4) nodes that are zero, without a negative neighbour
     curved: Crossings  # of edges with the zero set of the cubic interpolant
     # (c, 4) the crossings: smooth ones on the zero set of the cubic interpolant, others on that linear along edges
     points: Floats
     smooth: Bools  # (c,) whether distance around a crossing is measured to the interpolant's zero set
-    uneven: float  # how much distance to the interpolant may differ from that to the triangles
-    reach: float  # no point of the zero set is farther from its nearest crossing
+    uneven: float  # largest difference between distance to circles and distance to triangles
+    reach: float  # largest distance of a point of the zero set from its nearest crossing
 
 
 def smoothed_signs(signs: Floats) -> Floats:
-    """Return values with the given signs, ±1, whose contour is smoother."""
+    """Return values with the same signs as an array of ±1, whose contour is smoother."""
     agreement = scipy.ndimage.gaussian_filter(signs, SIGN_BLUR, mode="nearest") * signs
     return signs * np.clip(agreement, LEAST_SIGN, 2 * LEAST_SIGN)
 
 
 def zero_contour(values: Floats, steps: Floats) -> Contour:
-    """Extract the zero set of an array with one to four axes, of four without triangles; zero counts as positive."""
+    """Extract the zero set of an array with one to four axes, without triangles if four; zero counts as positive."""
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
     reach = float(np.linalg.norm(steps[unused:]))
@@ -262,7 +268,10 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
 
 
 def distances_to(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -> Floats:
-    """Return unsigned distances to the zero set of the nodes of a grid with four axes, given its first node."""
+    """Return unsigned distances from the nodes of a grid with four axes, in its shape, to a zero set.
+
+    `origin` and `steps` are the (4,) position of its first node, and its spacing.
+    """
     distances, zeros = np.full(tuple(shape), np.inf), PointTree(contour.zeros)
     side = BLOCK * max(1, round(TILE_NODES ** (1 / max((shape > 1).sum(), 1)) / BLOCK))
     measured = _to_triangles(contour, origin, steps, shape) if len(contour.faces) else _to_crossings(contour)
@@ -282,7 +291,7 @@ def distances_to(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -
 
 
 def _to_triangles(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -> Measured:
-    """Return a function that measures the nodes of a grid with up to three axes to the contour."""
+    """Return a function that measures distance from tiles of a grid with up to three axes to the contour."""
     features = FaceFeatures.of(contour.vertices, contour.faces)
     tree, corners = FaceTree.of(features), contour.numbers[contour.faces[features.ids]]
     _ = tree.discs  # before threads compute them twice
@@ -300,7 +309,7 @@ def _to_triangles(contour: Contour, origin: Floats, steps: Floats, shape: Ints) 
 
 
 def _to_crossings(contour: Contour) -> Measured:
-    """Return a function that measures the nodes of a grid with four axes to the nearest crossings, if there are any."""
+    """Return a function that measures distance from tiles of a grid with four axes to crossings, ∞ without any."""
     crossings = PointTree(contour.points)
 
     def measured(first: Ints, stop: Ints, places: Floats) -> Floats:
@@ -312,9 +321,9 @@ def _to_crossings(contour: Contour) -> Measured:
 
 
 def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) -> Floats:
-    """Return (n,) distances of places, given those to the nearest triangles, whose corners are (n, 3) crossings.
+    """(n,) distances of (n, 4) places, given those to the nearest triangles, whose corners are (n, 3) crossings.
 
-    Where the nearest corner is smooth, its circle takes the place of the triangle, up to `uneven` nearer or farther.
+    Where the nearest corner is smooth, distance is to its circle instead, at most `uneven` nearer or farther.
     """
     crossings = _nearest_corners(contour.points, corners, places)
     rows = np.flatnonzero((crossings >= 0) & contour.smooth[crossings])
@@ -325,7 +334,7 @@ def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) 
 
 
 def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floats:
-    """Return (n,) distances to the touching circles at the nearest crossings; if not smooth, to flat discs."""
+    """(n,) distances of (n, 4) places to the touching circles at the nearest crossings, or discs if not smooth."""
     away = places - contour.curved.places[crossings]
     heights = contour.curved.heights(crossings, away)
     across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
@@ -334,13 +343,16 @@ def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floa
 
 
 def circle_distances(contour: Contour, crossings: Ints, places: Floats) -> Floats:
-    """Return (n,) distances of (n, 4) places to circles that touch the zero set at (n,) crossings."""
+    """(n,) distances of (n, 4) places to circles that touch the zero set at (n,) crossings and are as curved."""
     return _circle_distances(*contour.curved, contour.reach, crossings, places)
 
 
 @compiled
 def _nearest_corners(points: Floats, corners: Ints, places: Floats) -> Ints:
-    """Return (n,) which point in each row of corners, where −1 is none, is nearest to each of (n, 4) places, or −1."""
+    """(n,) the point that is nearest to each of (n, 4) places, of those in its row of (n, k) corners, or −1.
+
+    A corner of −1 stands for none.
+    """
     chosen = np.full(len(places), -1)
     for row in range(len(places)):
         least = np.inf
@@ -357,7 +369,7 @@ def _nearest_corners(points: Floats, corners: Ints, places: Floats) -> Ints:
 def _circle_distances(
     points: Floats, normals: Floats, bends: Floats, reach: float, crossings: Ints, places: Floats
 ) -> Floats:
-    """Do the work of `circle_distances`."""
+    """Compute `circle_distances`, given the arrays of `Crossings`."""
     distances, away, across = np.empty(len(places)), np.empty(4), np.empty(4)
     for row in range(len(places)):
         c = crossings[row]
@@ -383,7 +395,11 @@ def _circle_distances(
 
 
 def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Ints]:
-    """Return vertices, in cells; triangles; crossed edges; a vertex on each edge; and each vertex's edge, or −1."""
+    """Contour values with up to three axes by marching cubes.
+
+    Return (v, 3) vertices, in cells; (m, 3) triangles; (e, 5) crossed edges, as node and axis; (e,) a vertex on each
+    edge; and the (v,) edge of each vertex, or −1.
+    """
     unused = 3 - values.ndim
     if not ((values < 0).any() and (values >= 0).any()):
         none = np.empty(0, dtype=np.int64)
@@ -411,7 +427,7 @@ def _marched(values: Floats) -> tuple[Floats, Ints, NDArray[np.int32], Ints, Int
 
 
 def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
-    """Move the chosen vertices to the mean of the other vertices that they share triangles with."""
+    """Move the (v,) chosen vertices to the mean of the other vertices that they share triangles with, in place."""
     sums, counts = np.zeros_like(vertices), np.zeros(len(vertices))
     for k in range(3):
         for neighbor in (k - 1, k - 2):
@@ -423,7 +439,10 @@ def _between_others(vertices: Floats, faces: Ints, chosen: Bools) -> None:
 
 
 def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
-    """Return (c,) how far each crossing lies from its linear place, or its neighbours from its paraboloid, if more."""
+    """(c,) distance of each crossing from its (c, 4) linear one, or of its neighbours from its paraboloid, if larger.
+
+    `pairs` are (p, 2) neighbouring crossings.
+    """
     uneven: Floats = np.linalg.norm(curved.places - linear, axis=1)
     crossing, neighbor = np.concatenate([pairs, pairs[:, ::-1]]).T
     away = curved.places[neighbor] - curved.places[crossing]
@@ -433,7 +452,7 @@ def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
 
 
 def crossed_edges(field: Floats) -> NDArray[np.int32]:
-    """Return (e, 5) node and axis of each edge whose ends have different signs; zero counts as positive."""
+    """(e, 5) node, four indices, and axis of each edge whose ends have different signs; zero counts as positive."""
     nodes_by_axis = [np.argwhere(np.diff(field < 0, axis=axis)) for axis in range(4)]
     edges = np.concatenate([np.insert(nodes, 4, axis, axis=1) for axis, nodes in enumerate(nodes_by_axis)])
     return np.ascontiguousarray(edges, dtype=np.int32)
@@ -441,7 +460,10 @@ def crossed_edges(field: Floats) -> NDArray[np.int32]:
 
 @compiled
 def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> float:
-    """Return the cubic convolution interpolant (Keys 1981) at a position in cells; write its gradient."""
+    """Return the cubic convolution interpolant (Keys 1981) at a place, (4,) in cells; write its gradient.
+
+    `weights`, (2, 4, 4), is working memory.
+    """
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):
         n = field.shape[axis]
@@ -493,7 +515,7 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
 
 @compiled
 def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the places, normals and bends of `Crossings` for (e, 5) crossed edges."""
+    """Return the attributes of `Crossings` for (e, 5) crossed edges of a field with four axes."""
     n = len(edges)
     places, normals, bends = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4, 4))
     weights = np.empty((2, 4, 4))

@@ -17,18 +17,21 @@ from ..jobs import interruptible
 from ..parallel import in_threads, n_threads
 
 FEW_NODES = 100_000
-"""Number of nodes below which a grid is worked on by one thread."""
+"""Grids with fewer nodes than this are processed by one thread."""
 SLAB = 4
-"""Rows of grid lines in one job of a thread; with 16, jobs add a tenth to the memory of 128³ nodes."""
+"""Number of layers of nodes that a thread processes at a time. With 16 the memory of 128³ nodes is a tenth larger."""
 
 
 def padded_shape(shape: tuple[int, ...]) -> tuple[int, int, int, int]:
-    """Return the shape, preceded by axes of one node to make four."""
+    """Return a shape with four axes: the given one, preceded by axes of one node."""
     return (1,) * (4 - len(shape)) + tuple(shape)  # type: ignore[return-value]
 
 
 def divergence(directions: NDArray[np.floating], spacing: Floats) -> Floats:
-    """Return −∇·Y, b of Eq. 13: the flux between two nodes is the mean of Y at both, and zero through walls."""
+    """Return −∇·Y, b of Eq. 13, for (*shape, d) directions Y at nodes.
+
+    The flux between two nodes is the mean of Y at both, and zero through the walls of the grid.
+    """
     shape = directions.shape[:-1]
     components = np.moveaxis(directions, -1, 0).reshape(-1, *padded_shape(shape))
     out = np.empty(padded_shape(shape))
@@ -49,7 +52,10 @@ def laplacian(values: Floats, spacing: Floats) -> Floats:
 
 
 def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = False) -> Floats:
-    """Return φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform that diagonalises C."""
+    """Return φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform, which diagonalises C.
+
+    With `overwrite`, the memory of b may be used.
+    """
     workers = n_threads()
     transformed = interruptible(scipy.fft.dctn, right_hand_side, type=2, overwrite_x=overwrite, workers=workers)
     eigenvalues = [
@@ -63,7 +69,10 @@ def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = Fa
 
 
 def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[Ints, Floats]:
-    """Return (s, 2^k) nodes and weights of multilinear interpolation at positions in cells; k axes have many nodes."""
+    """(s, 2^k) nodes, numbered in C order, and weights of multilinear interpolation at (s, d) positions in cells.
+
+    k is the number of axes with more than one node.
+    """
     positions = np.clip(positions, 0, np.array(shape) - 1)  # rounding may put one outside
     cell = np.minimum(positions.astype(np.int64), np.array(shape) - 2)
     part = positions - cell
@@ -80,7 +89,10 @@ def interpolation_stencil(positions: Floats, shape: tuple[int, ...]) -> tuple[In
 
 
 def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: Any) -> None:
-    """Call ``kernel(*arguments, axis, start, stop)`` for slabs of a grid of four axes, in threads if it is large."""
+    """Call ``kernel(*arguments, axis, start, stop)`` for slabs of a grid with four axes, in threads if it is large.
+
+    A slab has the nodes from `start` to `stop` along `axis`.
+    """
     axis = 0 if shape[0] > 1 else 1  # in the plane both axes have one node: its grids are one slab
     n = shape[axis]
     if np.prod(shape) < FEW_NODES:
@@ -90,12 +102,15 @@ def by_slabs(shape: tuple[int, ...], kernel: Callable[..., None], *arguments: An
 
 
 def slab(axis: int, start: int, stop: int) -> tuple[slice, ...]:
-    """Return the index of a slab in arrays of four axes."""
+    """Return the index of a slab in arrays with four axes: nodes from `start` to `stop` along `axis`."""
     return tuple(slice(start, stop) if axis == k else slice(None) for k in range(4))
 
 
 def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: int, stop: int) -> None:
-    """Divide by the eigenvalues of C, sums of one-dimensional ones; the quotient is zero where they are zero."""
+    """Divide a slab by the eigenvalues of C, in place; the quotient is zero where they are zero.
+
+    They are sums of the one-dimensional eigenvalues along the four axes.
+    """
     window = slab(axis, start, stop)
     total = np.zeros(())
     for values in np.ix_(*(values[part] for values, part in zip(eigenvalues, window, strict=True))):
@@ -107,7 +122,7 @@ def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: in
 def _divergence(
     components: NDArray[np.floating], scales: Floats, out: Floats, axis: int, start: int, stop: int
 ) -> None:
-    """Write −∇·Y in a slab."""
+    """Write −∇·Y in a slab of `out`; `scales` are 1 / (2 h) along each axis of the grid."""
     low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
     around = np.moveaxis(np.moveaxis(components, axis + 1, 0)[low:high], 0, axis + 1)
     sums = np.zeros(around.shape[1:])

@@ -195,7 +195,10 @@ def refine(g: Gluing, agenda: Agenda, goal: Goal, patience: int) -> int:
 
 @compiled
 def is_bad(g: Gluing, f: int, goal: Goal) -> tuple[bool, int]:
-    """Return whether face f is too thin or too large, and the halfedge of its shortest side, opposite the least angle."""
+    """Return whether face f is too thin or too large, and the halfedge of its shortest side, opposite its least angle.
+
+    `goal` says how thin and how large it may be.
+    """
     h = 3 * f
     for k in range(1, 3):
         if g.length[g.edge[3 * f + k]] < g.length[g.edge[h]]:
@@ -536,7 +539,10 @@ def find_circumcenter(g: Gluing, f: int) -> tuple[int, int, complex]:
 
 @compiled
 def encroached(g: Gluing, agenda: Agenda, f: int, p: complex) -> int:
-    """Return a halfedge of a segment whose diametral circle contains p, in the frame of face f; −1 if none is visible."""
+    """Return a halfedge of a segment whose diametral circle contains p; −1 if no such segment is visible from p.
+
+    p is in the frame of face f.
+    """
     ends, halfedges = agenda.seen_sides, agenda.halfedges
     corners = corners_of(g, f)
     for k in range(3):

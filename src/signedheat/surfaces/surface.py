@@ -513,7 +513,7 @@ class Surface(Frozen, LinearDomain):
         return vertices
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
-        """Convert a mask of the faces of the domain to one of the faces of `triangulation`; raise if it does not fit."""
+        """Convert a mask of the domain's faces to one of the faces of `triangulation`; raise if it does not fit."""
         check_mask(face_mask, self.triangulation.n_faces)
         return face_mask
 
@@ -577,7 +577,7 @@ def projected_curve(
 
 
 def closest_points(mesh: PlaceableTriangles, points: Floats) -> tuple[Ints, Floats, Floats]:
-    """Find the points of a mesh closest to (n, 3) points: (n,) faces, (n, 3) barycentric coordinates, (n,) distances."""
+    """(n,) faces and (n, 3) barycentric coordinates of the closest points of a mesh, and (n,) distances to them."""
     faces, weights = mesh.search_tree.nearest(points)
     closest = np.einsum("ik,ikj->ij", weights, mesh.vertices[mesh.faces[faces]])
     return faces, weights, np.linalg.norm(points - closest, axis=1)
