@@ -1,4 +1,4 @@
-"""Types of arrays, frozen dataclasses that hold them, what both are in words, and a small cache."""
+"""Types of arrays, frozen dataclasses that hold them, short representations of both, and a small cache."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Complexes: TypeAlias = NDArray[np.complex128]
 
 
 def mask_of(n: int, ids: NDArray[np.integer] | list[int]) -> Bools:
-    """(n,) array that is True at the ids."""
+    """Return an (n,) boolean array that is true at the given ids."""
     mask = np.zeros(n, dtype=bool)
     mask[ids] = True
     return mask
@@ -26,37 +26,39 @@ def mask_of(n: int, ids: NDArray[np.integer] | list[int]) -> Bools:
 
 Number = TypeVar("Number", bound=np.generic)
 MOST_WRITTEN_OUT = 6
-"""Largest number of entries of an array or a sequence that `short` writes out."""
+"""Number of entries of an array or a sequence up to which `short` writes all of them. Above it writes the size only."""
 
 
 class Frozen:
-    """A frozen dataclass whose copies and pickles hold only its fields; read-only arrays stay read-only.
+    """Base class of frozen dataclasses whose copies and pickles hold only their fields, and keep arrays read-only.
 
-    Cached properties are computed again: they are often larger than the fields, or lie in memory of other libraries.
+    Cached properties are left out and computed again, since they are often larger than the fields, or lie in memory of
+    other libraries.
     """
 
     def __getstate__(self) -> tuple[dict[str, object], frozenset[str]]:
+        """Return the values of fields by name, and the names of those that are read-only arrays."""
         names = {entry.name for entry in fields(self)} if is_dataclass(self) else self.__dict__.keys()
-        held = {name: value for name, value in self.__dict__.items() if name in names}
-        arrays = {name: value for name, value in held.items() if isinstance(value, np.ndarray)}
-        return held, frozenset(name for name, array in arrays.items() if not array.flags.writeable)
+        values = {name: value for name, value in self.__dict__.items() if name in names}
+        arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+        return values, frozenset(name for name, array in arrays.items() if not array.flags.writeable)
 
     def __setstate__(self, state: tuple[dict[str, object], frozenset[str]]) -> None:
-        held, read_only = state
-        self.__dict__.update(held)
+        values, read_only = state
+        self.__dict__.update(values)
         for name in read_only:
-            cast("NDArray[np.generic]", held[name]).flags.writeable = False
+            cast("NDArray[np.generic]", values[name]).flags.writeable = False
 
 
 def read_only(array: NDArray[Number]) -> NDArray[Number]:
-    """Return a read-only view, since kernels would be compiled again for writable arrays."""
+    """Return a read-only view of an array. Numba compiles a kernel for read-only and for writable arrays separately."""
     view: NDArray[Number] = array.view()
     view.flags.writeable = False
     return view
 
 
 class ShortRepr:
-    """A dataclass, made with ``repr=False``, whose representation is short."""
+    """Base class of dataclasses, made with ``repr=False``, whose ``repr`` shows large arrays by their shape only."""
 
     def __repr__(self) -> str:
         assert is_dataclass(self)
@@ -65,12 +67,12 @@ class ShortRepr:
 
 
 def short(value: object) -> str:
-    """Write a value as a short text: numbers with four digits, large arrays as their shape."""
+    """Return a short text for a value, with four digits of numbers, and the shape of large arrays."""
     if isinstance(value, np.ndarray):
         if value.ndim == 1 and value.size <= MOST_WRITTEN_OUT and value.dtype.kind in "biuf":
             return f"[{', '.join(short(entry) for entry in value.tolist())}]"
-        what = {"b": "booleans", "f": "numbers", "i": "numbers", "u": "numbers"}.get(value.dtype.kind, "entries")
-        return f"{' × '.join(map(str, value.shape))} {what}"
+        noun = {"b": "booleans", "f": "numbers", "i": "numbers", "u": "numbers"}.get(value.dtype.kind, "entries")
+        return f"{' × '.join(map(str, value.shape))} {noun}"
     if isinstance(value, float):
         return f"{value:.4g}"
     if isinstance(value, dict):
@@ -88,7 +90,7 @@ V = TypeVar("V")
 
 
 class LastUsed(Generic[K, V]):
-    """A cache of the last few values that a frozen object derives from an argument; copies and pickles are empty."""
+    """A cache of the `size` values that were last used, by key, for a frozen object. Copies and pickles are empty."""
 
     def __init__(self, size: int = 1) -> None:
         self.size = size
@@ -96,7 +98,7 @@ class LastUsed(Generic[K, V]):
         self._lock = RLock()
 
     def __call__(self, key: K, make: Callable[[], V]) -> V:
-        """Return the cached value for a key, or make it and cache it."""
+        """Return the cached value for a key, or that of ``make()``, which is then cached."""
         with self._lock:
             if key in self._values:
                 value = self._values.pop(key)
@@ -112,7 +114,7 @@ class LastUsed(Generic[K, V]):
 
 
 def fingerprint(*arrays: NDArray[Any]) -> bytes:
-    """Return a key that only arrays with equal types, shapes and bits share."""
+    """Return a digest of arrays, which is the same only for arrays of equal types, shapes and bits."""
     digest = hashlib.blake2b(digest_size=32)
     for array in arrays:
         digest.update(f"{array.dtype.str}{array.shape}".encode())

@@ -42,23 +42,24 @@ logger: logging.Logger = logging.getLogger("signedheat")
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 """Options of ``numba.njit``: division by zero raises nothing, and no wrapper for calls from C is compiled."""
 SHORT = 1 << 13
-"""Number of entries of arrays up to which a kernel is too short for anybody to interrupt it."""
+"""Number of entries of all array arguments up to which a kernel is called directly. Above it, the call runs on another
+thread, so that Ctrl-C can interrupt the wait for it."""
 WORD = re.compile(r"\w+")
 DAMAGE = OSError, EOFError, pickle.UnpicklingError
 """Errors of a cache whose files are damaged or cannot be written. Kernels raise none of them."""
 BASELINE = "x86-64-v3"
-"""Processors that the kernels of wheels are compiled for: level 3 of the x86-64 ABI, most made since 2013."""
+"""Processors that the kernels of wheels are compiled for, level 3 of the x86-64 ABI. Most made since 2013 are."""
 BASELINE_FEATURES = "avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sahf", "xsave"
-"""What LLVM calls the features of level 3, without those that AVX implies."""
+"""LLVM's names for the features of level 3, without those that AVX implies."""
 CARRIED = Path(__file__).parent / "kernels"
 """Folder of the kernels that a wheel carries, which `make wheel` fills."""
 _names: dict[Callable[..., Any], str] = {}
-"""Names of the folders of the functions of which dispatchers are being made."""
+"""Cache folder of each function whose dispatcher is being made (`kept_as`)."""
 _lock = RLock()
 Parameters = ParamSpec("Parameters")
 Returned = TypeVar("Returned")
 made: list[Kernel[..., Any]] = []
-"""The kernels that this process has used."""
+"""Kernels that this process has used so far."""
 announce: Announcement = Announcement(
     "compiling what this needs, once, for up to a minute (signedheat warmup compiles all)", everywhere=True
 )
@@ -85,10 +86,10 @@ class Kernel(Generic[Parameters, Returned]):
             self._is_warm = True
             return returned
         except Exception as error:
-            for each in _chain(error):
-                if isinstance(each, KeyboardInterrupt):  # Numba and Python raise SystemErrors because of it
-                    raise each from None
-            if not Kernel.is_kept or not any(isinstance(each, DAMAGE) for each in _chain(error)):
+            for cause in _chain(error):
+                if isinstance(cause, KeyboardInterrupt):  # Numba and Python raise SystemErrors because of it
+                    raise cause from None
+            if not Kernel.is_kept or not any(isinstance(cause, DAMAGE) for cause in _chain(error)):
                 raise
             logger.warning("the cache of compiled kernels is not used any more: %s", error)
         with _lock:
@@ -100,20 +101,24 @@ class Kernel(Generic[Parameters, Returned]):
         return interruptible(self._compiled_call, *arguments, **named)
 
     def _compiled_call(self, *arguments: Parameters.args, **named: Parameters.kwargs) -> Returned:
-        """Compile what is not, and call it: neither may be interrupted, nor may the import of Numba."""
+        """Compile the function if necessary, and call it. Neither may be interrupted, nor may the import of Numba."""
         return self.dispatcher(*arguments, **named)
 
     @cached_property
     def dispatcher(self) -> Callable[Parameters, Returned]:
-        """The compiled function, or the function itself if ``NUMBA_DISABLE_JIT`` is set."""
+        """The compiled function that Python calls, or the function itself if ``NUMBA_DISABLE_JIT`` is set."""
         return self._dispatcher(called_by_python=True)
 
     @cached_property
     def part(self) -> Callable[Parameters, Returned]:
-        """The function as compiled code calls it: what lets Python call it takes up to half as long to compile."""
+        """The compiled function that other kernels call.
+
+        It has no wrapper for calls from Python, which would take up to half as long to compile as the function.
+        """
         return self.dispatcher if "dispatcher" in vars(self) else self._dispatcher(called_by_python=False)
 
     def _dispatcher(self, called_by_python: bool) -> Callable[Parameters, Returned]:
+        """Make Numba's dispatcher, with a cache on disk if possible, and announce that it compiles if it will."""
         options = {**self.options, "no_cpython_wrapper": not called_by_python}
         with _lock:
             _prepare()
@@ -139,14 +144,17 @@ def compiled(function: Callable[Parameters, Returned]) -> Kernel[Parameters, Ret
 @overload
 def compiled(**options: Any) -> Callable[[Callable[Parameters, Returned]], Kernel[Parameters, Returned]]: ...
 def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Any:
-    """Make a function a kernel: ``@compiled``, or ``@compiled(fastmath=True)`` with options of ``numba.njit``."""
+    """Decorate a function with ``@compiled``, or ``@compiled(fastmath=True)``, so that Numba compiles it at first use.
+
+    Options are those of ``numba.njit``.
+    """
     if function is not None:
         return Kernel(function, options)
     return lambda function: Kernel(function, options)
 
 
 def cache_folder() -> Path:
-    """Return the folder for compiled code: what NUMBA_CACHE_DIR names, or else a folder in the user's cache."""
+    """Return the folder for compiled code, which is in ``NUMBA_CACHE_DIR``, if that is set, or in the user's cache."""
     wanted = os.environ.get("NUMBA_CACHE_DIR")
     if wanted:
         return Path(wanted) / "signedheat"
@@ -161,7 +169,7 @@ def cache_folder() -> Path:
 
 @contextmanager
 def kept_as(function: Callable[..., Any], name: str) -> Iterator[None]:
-    """Let Numba keep the compiled code of a function in the folder `name` if its dispatcher is made meanwhile."""
+    """Within a ``with`` block, let dispatchers made for a function keep their code in the folder `name`."""
     config = numba.config
     before, config.CACHE_LOCATOR_CLASSES = config.CACHE_LOCATOR_CLASSES, f"{__name__}.{KernelLocator.__name__}"
     _names[function] = name
@@ -173,12 +181,12 @@ def kept_as(function: Callable[..., Any], name: str) -> Iterator[None]:
 
 
 def has_code(name: str) -> bool:
-    """Tell whether code of this processor is kept by a name."""
+    """Whether compiled code for this processor is in a cache folder with this name."""
     return any(any((root / name / _processor()).glob("*.nbi")) for root in _roots(name))
 
 
 class KernelLocator:
-    """The first folder that can be written to, as Numba's cache asks for it."""
+    """Numba's interface to find the cache folder of a kernel. It chooses the first one that can be written to."""
 
     def __init__(self, folder: Path, file: str) -> None:
         self._folder = folder
@@ -186,7 +194,7 @@ class KernelLocator:
 
     @classmethod
     def from_function(cls, function: Callable[..., Any], file: str) -> KernelLocator | None:
-        """Return a locator, or None if no folder can be written to."""
+        """Return the locator of a function's cache, or None if no folder can be written to."""
         name = _names[function]
         for root in _roots(name):
             locator = cls(root / name / _processor(), file)
@@ -209,16 +217,16 @@ class KernelLocator:
         return str(self._folder)
 
     def get_source_stamp(self) -> str:
-        """Return what the code is made of."""
+        """Return the digest of the code, which is the name of the kernel's folder."""
         return self._folder.parent.name
 
     def get_disambiguator(self) -> str:
-        """Return nothing: each function has a folder of its own."""
+        """Return an empty text, since each function has a folder of its own."""
         return ""
 
 
 def _roots(name: str) -> Iterator[Path]:
-    """Yield the folders for compiled code, the best first."""
+    """Yield the folders in which a kernel's folder `name` may lie, the preferred one first."""
     yield cache_folder()
     yield _folder_beside_the_source()
     if (CARRIED / name).is_dir() and _kind_of_code() is not None:
@@ -231,13 +239,13 @@ def _folder_beside_the_source() -> Path:
 
 @cache
 def _folder_of_this_process() -> tempfile.TemporaryDirectory[str]:
-    """Make a folder that is removed at the end."""
+    """Make a temporary folder that is removed when the process ends."""
     return tempfile.TemporaryDirectory(prefix="signedheat-")
 
 
 @cache
 def _processor() -> str:
-    """Return a name for the code of this processor, or of that which Numba's settings ask for."""
+    """Return a short digest of the processor that code is compiled for, the host or the one of Numba's settings."""
     config, host = numba.config, (llvmlite.get_host_cpu_name(), llvmlite.get_host_cpu_features().flatten())
     code = *host, config.CPU_NAME, config.CPU_FEATURES, config.ENABLE_AVX
     return hashlib.sha256(repr(code).encode()).hexdigest()[:8]
@@ -245,7 +253,10 @@ def _processor() -> str:
 
 @cache
 def _kind_of_code() -> tuple[str, str, str] | None:
-    """Return how Numba describes code of this processor, or None where `BASELINE` does not run or is not wanted."""
+    """Return Numba's tuple that identifies code for this processor.
+
+    It is None if the processor does not run code for `BASELINE`, or if Numba's settings ask for another processor.
+    """
     config = numba.config
     if config.CPU_NAME is not None or config.CPU_FEATURES is not None or not config.ENABLE_AVX:
         return None
@@ -256,9 +267,9 @@ def _kind_of_code() -> tuple[str, str, str] | None:
 
 
 def _unpack(carried: Path, folder: Path) -> None:
-    """Copy the code of a kernel from a wheel, and list it as code of this processor.
+    """Copy a kernel's compiled code from the folder of a wheel, `carried`, to a cache folder, for this processor.
 
-    The lists have the format of the version of Numba that wrote them: it is part of the name of the folder.
+    Index files have a format that depends on Numba's version, which is part of the name of the folder.
     """
     kind = _kind_of_code() if carried.is_dir() else None
     if kind is None:
@@ -276,16 +287,17 @@ def _unpack(carried: Path, folder: Path) -> None:
 
 
 def _replace(path: Path, content: bytes) -> None:
-    """Write a file atomically, since other processes may do so, too."""
+    """Write a file atomically, since other processes may write it at the same time."""
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
         file.write(content)
     os.replace(file.name, path)
 
 
 def _digest(kernel: Kernel[..., Any]) -> str:
-    """Digest Numba's version and the code, options, constants and classes of a kernel and of those that it calls.
+    """Return a digest of everything that the compiled code of a kernel depends on.
 
-    Named tuples count since Numba's cache holds them by their modules, and fails if they have moved.
+    This is Numba's version and, for the kernel and all kernels that it calls, code, options, constants and named
+    tuples. Numba's cache refers to named tuples by their modules, and fails if they have moved.
     """
     digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
     while waiting:
@@ -310,7 +322,10 @@ def _digest(kernel: Kernel[..., Any]) -> str:
 
 
 def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[str]:
-    """Yield the module, name and fields of each named tuple that is mentioned, and of those that it contains."""
+    """Yield a text with module, name and fields of each named tuple among words, and of those that it contains.
+
+    `mentioned` are annotations and names that occur in code, and `names` the values that they may refer to.
+    """
     for word in WORD.findall(" ".join(map(str, mentioned))):
         value = names.get(word)
         if isinstance(value, type) and hasattr(value, "_fields"):
@@ -319,7 +334,7 @@ def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[s
 
 
 def _spelled(value: Any) -> Any:
-    """Return code and constants as values whose text is the same in every process; sort sets, which have no order."""
+    """Return a code object or constant as a value whose ``repr`` is the same in every process, with sets sorted."""
     if isinstance(value, CodeType):
         return value.co_code, value.co_names, [_spelled(constant) for constant in value.co_consts]
     return sorted(map(repr, value)) if isinstance(value, frozenset) else value
@@ -337,6 +352,7 @@ def _entries(arguments: Iterable[Any]) -> int:
 
 
 def _chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error, its cause or context, the cause of that, and so on."""
     while error is not None:
         yield error
         error = error.__cause__ or error.__context__
@@ -344,7 +360,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 
 @cache
 def _prepare() -> None:
-    """Register kernels as a type of Numba, so that compiled code can call them; check the number of threads."""
+    """Register kernels as a type of Numba, so that compiled code can call them, and check ``NUMBA_NUM_THREADS``."""
     threads = os.environ.get("NUMBA_NUM_THREADS")
     if threads is not None and not (threads.isdecimal() and 0 < int(threads) <= MOST_THREADS):
         raise SignedHeatError(
@@ -354,7 +370,7 @@ def _prepare() -> None:
         )
 
     class Part(numba.types.Dispatcher):  # type: ignore[misc]
-        """The type of a kernel in compiled code, which compiles it for all numbers of a type, not for literals."""
+        """Numba's type of a kernel. It is compiled for types of arguments only, not for each literal constant."""
 
         def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
             any_number = numba.types.unliteral

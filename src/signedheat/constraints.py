@@ -18,7 +18,7 @@ __all__ = ["Constraint", "EachComponent", "Free", "LevelValues", "Soft", "ZeroSe
 
 @runtime_checkable
 class Constraint(Protocol):
-    """Protocol of constraints, which finish step 3.
+    """Protocol of constraints on φ. A constraint solves step 3 of the method, the integration of unit vectors.
 
     See Also
     --------
@@ -34,14 +34,14 @@ class Constraint(Protocol):
         integration : Integration
             Solves Eq. 13 of the paper with constraints, on one domain.
         divergence : (n,) float
-            Right-hand side b: the integrated divergence of the unit vectors Y.
+            Right-hand side b of Eq. 13, the integrated divergence of the unit vectors Y.
         source : SourceTerm
-            Points where φ is constrained, with weights and components.
+            Samples of the source, at which φ is constrained, with weights and connected components.
 
         Returns
         -------
         (n,) float
-            φ, a length.
+            φ at the unknowns, in the units of the domain.
 
         See Also
         --------
@@ -77,15 +77,16 @@ class Free(Constraint):
 
 @dataclass(frozen=True)
 class ZeroSet(Constraint):
-    """φ = 0 on the source (Eq. 14). This is the default.
+    """Impose φ = 0 on the source, so that it lies in the zero set (Eq. 14). This is the default.
 
     Parameters
     ----------
     hard : bool
-        Impose φ = 0 at every sample of the source. By default, φ is zero on surfaces along curves that follow edges;
-        where a curve crosses faces, springs keep it within some hundredths of h, since a linear function that is zero
-        there would be constant around the curve. On grids a smooth function, and on tets springs, correct φ to about
-        zero along the source, which is cheaper and, on broken input, more accurate.
+        If true, φ is exactly zero at every sample of the source. By default this holds only for curves along edges of a
+        surface. Where a curve crosses faces, a penalty keeps φ within some hundredths of h, the mean distance between
+        unknowns, because a function that is linear in a face and zero along the curve would be constant around it.
+        On grids a smooth function is subtracted from φ, and on tets there is a penalty, so that φ is about zero on the
+        source. That is cheaper than ``hard=True`` and, on broken input, more accurate.
 
     See Also
     --------
@@ -108,12 +109,12 @@ class ZeroSet(Constraint):
 
 @dataclass(frozen=True)
 class EachComponent(Constraint):
-    """φ is constant on each connected component of the source, at an unknown level (Eq. 14, Fig. 10).
+    """Impose that φ is constant on each connected component of the source, at an unknown level (Eq. 14, Fig. 10).
 
     Parameters
     ----------
     hard : bool
-        Impose the levels at every sample; by default, they are imposed as exactly as by `ZeroSet`.
+        If true, φ is exactly constant at all samples of a component. By default it is as exact as with `ZeroSet`.
 
     See Also
     --------
@@ -135,21 +136,21 @@ class EachComponent(Constraint):
 
 @dataclass(frozen=True, repr=False)
 class LevelValues(ShortRepr, Constraint):
-    """Given levels: φ = ``values[k]`` on the k-th source, as for the contour lines of a map (Eq. 14 with ``A φ = c``).
+    """Impose φ = ``values[k]`` on the k-th source, as for contour lines of a map (Eq. 14 with ``A φ = c``).
 
     Parameters
     ----------
     values : sequence of float
-        One level for each source passed to the solver; or one for each connected component of the sources, components
-        of the first source first.
+        Levels in the units of the domain, one for each source passed to the solver, or one for each connected component
+        of the sources, with the components of the first source first.
     hard : bool
-        Impose the levels at every sample; by default, as exactly as `ZeroSet`.
+        If true, φ takes the levels exactly at every sample. By default it is as exact as with `ZeroSet`.
 
     Raises
     ------
     ConstraintError
-        If a value is not finite, or beyond 1e40; or, when solving, if the number of values is neither that of the
-        sources nor that of the components.
+        If a value is not finite, or its absolute value exceeds 1e40. Also when solving, if the number of values is
+        neither that of the sources nor that of the components.
 
     See Also
     --------
@@ -191,13 +192,14 @@ class LevelValues(ShortRepr, Constraint):
 
 @dataclass(frozen=True)
 class Soft(Constraint):
-    """A penalty pulls φ to zero on the source: zero weight is `Free`, infinite weight ``ZeroSet(hard=True)`` (Fig. 11).
+    """Add a penalty on the square of φ at the source, between `Free` and ``ZeroSet(hard=True)`` (Fig. 11).
 
     Parameters
     ----------
     weight : float, optional
-        λ, in 1/length; by default 10/h on surfaces and grids with spacing h, and according to the mesh on tets. φ
-        differs from the free solution within a distance of about 1/λ of the source.
+        Weight λ of the penalty, in 1/length. A small weight approaches `Free`, a large one ``ZeroSet(hard=True)``. φ
+        differs from the free solution within a distance of about 1/λ of the source. By default λ is 10/h on surfaces
+        and grids with spacing h. On tets it depends on the mesh.
 
     Raises
     ------

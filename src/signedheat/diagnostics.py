@@ -12,16 +12,16 @@ from .arrays import Frozen, Ints, ShortRepr
 from .errors import Sentence, percent
 
 SMALL_SHARE = 0.005
-"""Fraction of the surface up to which its completion, and parts that bound nothing or that a contour misses, are not
-important."""
+"""Fraction of a surface above which a note on its completion, or on parts that bound nothing or that a contour misses,
+is important."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Note(Frozen, ShortRepr):
-    """A note on a computation, whose values are numbers and lists; ``str(note)`` is its text.
+    """Base class of notes on a computation. A note has numbers and lists as fields, and ``str(note)`` is a sentence.
 
-    `text` is a format string in which ``{0.name}`` is a value of the note. A note is important if any of its values
-    exceeds the one of the same name in `limits`.
+    `text` is a format string in which ``{0.name}`` stands for a field. A note is important if any of its fields exceeds
+    the number of the same name in `limits`.
     """
 
     text: ClassVar[str] = ""
@@ -32,7 +32,7 @@ class Note(Frozen, ShortRepr):
 
     @property
     def important(self) -> bool:
-        """Whether the note should be read before the result is trusted; commands print it if so."""
+        """Whether the note should be read before the result is trusted. Commands print important notes."""
         return any(getattr(self, name) > limit for name, limit in self.limits.items())
 
     def __post_init__(self) -> None:
@@ -42,7 +42,7 @@ class Note(Frozen, ShortRepr):
                 object.__setattr__(self, entry.name, value.item())
 
     def as_dict(self) -> dict[str, object]:
-        """Return the values of the note by name, ready for JSON."""
+        """Return the fields of the note by name, as values that JSON can hold."""
         return asdict(self)
 
 
@@ -56,13 +56,14 @@ class Diagnostics(ShortRepr):
     Attributes
     ----------
     timings : mapping of str to float
-        Seconds per step.
+        Seconds that each step took, by the name of the step.
     time : float
         Diffusion time t, in squared units of length.
     unreached : (k,) int
-        Unknowns that are connected to no source; φ is NaN there.
+        Ids of the unknowns that are connected to no source, at which φ is NaN.
     notes : tuple of Note
-        Residuals, repairs, subdivisions, dropped parts of sources; `note` finds one by its type.
+        Notes such as on faces that were flipped, sources that were left out, or residuals. `note` finds one by its
+        type.
 
     See Also
     --------
@@ -85,21 +86,21 @@ class Diagnostics(ShortRepr):
 
     @property
     def important(self) -> list[Note]:
-        """Notes to read before the result is trusted."""
+        """The notes that should be read before the result is trusted, in order."""
         return [note for note in self.notes if note.important]
 
     def note(self, kind: type[AnyNote]) -> AnyNote | None:
-        """Return the note of a given type, or None.
+        """Return the note of a given type, or None if there is none.
 
         Parameters
         ----------
         kind : type
-            A class of `signedheat.diagnostics`, such as ``TetsTurned``.
+            A class of notes in `signedheat.diagnostics`, such as ``TetsTurned``.
 
         Returns
         -------
         Note or None
-            The note of this type among `notes`.
+            The first of `notes` that has this type.
 
         See Also
         --------
@@ -113,17 +114,17 @@ class Diagnostics(ShortRepr):
         return next((note for note in self.notes if isinstance(note, kind)), None)
 
     def noting(self, *notes: Note) -> Diagnostics:
-        """Add notes, each replacing an older one of the same type.
+        """Return a copy with more notes. A new note replaces older ones of the same type.
 
         Parameters
         ----------
         *notes : Note
-            In the order in which they are to be read.
+            The notes to add, in the order in which they should be read.
 
         Returns
         -------
         Diagnostics
-            A copy; this one stays as it is.
+            The copy. This object does not change.
 
         See Also
         --------
@@ -140,7 +141,7 @@ class Diagnostics(ShortRepr):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SampledSource(Note):
-    """How a source was merged in the cells of a grid: its samples, and the area lost outside and by cancellation."""
+    """Samples that represent a source on a grid: their number, the area outside the grid, and the area that cancels."""
 
     samples: int
     area_outside: float
@@ -153,7 +154,7 @@ class SampledSource(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutsideMesh(Note):
-    """Sources that leave the tet mesh: their indices, and the fraction of the area of each that is left out."""
+    """Indices of the sources that leave a tet mesh, and the fraction of the area of each that is outside."""
 
     sources_outside: list[int]
     area_left_out: list[float]
@@ -165,7 +166,7 @@ class OutsideMesh(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ShapeOriented(Note):
-    """How the faces of a shape were oriented; the values are those of `Orientation`, areas as fractions of the area."""
+    """Numbers on the orientation of a shape's faces, as in `Orientation`, with areas as fractions of the whole area."""
 
     turned_faces: int = 0
     turned_area: float = 0.0
@@ -220,11 +221,11 @@ class SmallParts(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LeftOut(Note):
-    """Faces that a union leaves out of a shape."""
+    """Faces that were left out of a shape because they lie inside other bodies of it."""
 
-    covered_faces: int = 0  # faces, or points, that lie inside other bodies, wholly or in part
-    covered_area: float = 0.0  # their fraction of the area
-    cut_faces: int = 0  # faces that lie inside in part, and were cut
+    covered_faces: int = 0  # number of faces, or points of a cloud, that lie inside other bodies, wholly or in part
+    covered_area: float = 0.0  # their area, as a fraction of the whole area
+    cut_faces: int = 0  # number of faces that lie inside in part, and were cut
     limits: ClassVar[Mapping[str, float]] = {"covered_faces": 0}
     text: ClassVar[str] = (
         "left out: {0.covered_faces:face}, {0.covered_area:%} of the area, that lie inside other bodies "
@@ -244,7 +245,7 @@ class FacesRestored(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToShape(Note):
-    """Fraction of the zero set's triangles to which distance is measured, in places where the shape has no faces."""
+    """Fraction of the zero set that completes a shape: its triangles far from faces, to which distance is measured."""
 
     completed_zero_set: float
     text: ClassVar[str] = "{0.completed_zero_set:%} of the zero set completes the shape"
@@ -252,10 +253,10 @@ class SharpenedToShape(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CompletedArea(Note):
-    """How much of the surface of a solid was added by completion, and where."""
+    """Area of a solid's surface that was added by completion, and boxes around it."""
 
     completed_area: float  # in squared units of length
-    completed_share: float  # fraction of the area of the whole surface
+    completed_share: float  # the same as a fraction of the area of the whole surface
     where: list[list[list[float]]]  # (k, 2, d) lower and upper corners of boxes around the completion
     limits: ClassVar[Mapping[str, float]] = {"completed_share": SMALL_SHARE}
 
@@ -269,7 +270,7 @@ class CompletedArea(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BoundsNothing(Note):
-    """Fraction of the area that bounds nothing: both of its sides are outside, and distance to it is positive."""
+    """Fraction of the area that bounds nothing. Both of its sides are outside, and distance to it is positive."""
 
     open_area: float
     limits: ClassVar[Mapping[str, float]] = {"open_area": SMALL_SHARE}
@@ -278,7 +279,7 @@ class BoundsNothing(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TetsTurned(Note):
-    """Number of tets given with negative volume, which have been turned."""
+    """Number of tets that were given with negative volume, and were flipped."""
 
     tets_turned: int
     text: ClassVar[str] = "tets flipped: {0.tets_turned}"
@@ -286,7 +287,7 @@ class TetsTurned(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EdgesLengthened(Note):
-    """Length that mollification has added to every edge, so that no triangle is flat."""
+    """Length, in units of the mesh, that mollification has added to every edge, so that no triangle is flat."""
 
     added_to_edge_lengths: float
     text: ClassVar[str] = "added to edge lengths: {0.added_to_edge_lengths:.3g}"
@@ -294,7 +295,7 @@ class EdgesLengthened(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LargeAngles(Note):
-    """Fraction of angles above 120°, if it is 1 % or more: an intrinsic triangulation is then more accurate."""
+    """Fraction of angles above 120°, noted if it is 1 % or more. An intrinsic triangulation is then more accurate."""
 
     large_angles: float
     text: ClassVar[str] = "{0.large_angles:%} of the angles exceed 120°"
@@ -302,7 +303,7 @@ class LargeAngles(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WithoutLength(Note):
-    """Numbers of curves that were left out since their points coincide, as when a stroke has become a mere click."""
+    """Numbers of curves that were left out since all of their points coincide, as when a user only clicks."""
 
     without_length: list[int]
 
@@ -312,7 +313,7 @@ class WithoutLength(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SmallLoops(Note):
-    """Number of closed curves that are smaller than a few triangles, to which the method is inaccurate."""
+    """Number of closed curves smaller than a few triangles. The signed heat method is inaccurate for them."""
 
     small_loops: int
     text: ClassVar[str] = "closed curves smaller than a few triangles: {0.small_loops}"
@@ -320,7 +321,7 @@ class SmallLoops(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VerticesJoined(Note):
-    """Number of vertices on seams that were joined with others at the same place."""
+    """Number of vertices on seams of a mesh that were welded to others at the same position."""
 
     vertices_joined: int
     text: ClassVar[str] = "vertices joined at seams: {0.vertices_joined}"
@@ -328,7 +329,7 @@ class VerticesJoined(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class VerticesAdded(Note):
-    """Number of vertices added so that sources run along edges."""
+    """Number of vertices that were added to a triangulation so that sources run along its edges."""
 
     vertices_added: int
     text: ClassVar[str] = "vertices added for sources: {0.vertices_added}"
@@ -359,20 +360,20 @@ class SlopeErrors(Note):
 
     slope_error_before: float
     slope_error_after: float
-    # whether the slopes of most of the domain became worse, so that the field before is the better distance; flat cells
-    # and the kinks of a distance, which may raise the root mean square, hardly count
+    # whether slopes on most of the domain became worse, so that the field before is the better distance. Flat cells and
+    # kinks of the distance hardly count for this, although they may raise the root mean square
     worse: bool = False
 
     def __str__(self) -> str:
-        found = f"slope error before: {self.slope_error_before:.3g}; after: {self.slope_error_after:.3g}"
-        return found + ("; the field before is the better distance" if self.worse else "")
+        text = f"slope error before: {self.slope_error_before:.3g}; after: {self.slope_error_after:.3g}"
+        return text + ("; the field before is the better distance" if self.worse else "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SharpenedToCurves(Note):
-    """What a field that was sharpened to curves measures distance to, and what decides its sign."""
+    """Shares that φ and the given curves have in the distance and sign of a field that was sharpened to curves."""
 
-    completed_length: float  # fraction of the length measured to that is zero set of φ, in place of missing curves
+    completed_length: float  # length of the zero set of φ in place of missing curves, relative to the whole length
     free_ends: int  # ends of oriented curves inside the surface, and points where curves run head to head
     sides_by_curves: float  # fraction of the vertices whose sign the curves decide; φ decides the others
     text: ClassVar[str] = (
@@ -383,7 +384,7 @@ class SharpenedToCurves(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GeodesicWindows(Note):
-    """Number of windows in the exact polyhedral distance, a measure of the work."""
+    """Number of windows in the computation of exact polyhedral distance, a measure of its work."""
 
     windows: int
     cut_short: bool = False  # whether some distances are lengths of paths along edges instead of shortest paths
@@ -394,7 +395,7 @@ class GeodesicWindows(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RoundCorners(Note):
-    """Number of vertices whose path to the zero set bends around the boundary of the mesh."""
+    """Number of vertices whose shortest path to the zero set bends around the boundary of the tet mesh."""
 
     round_corners: int
     text: ClassVar[str] = "round corners: {0.round_corners}"
@@ -411,12 +412,12 @@ class ConvexRounds(Note):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Jumps(Note):
-    """Objective of a piecewise distance with its lower bound, and the size of its jumps."""
+    """Objective of `piecewise_distance` with a lower bound of it, and the size of the jumps."""
 
-    objective: float  # of Eq. 16, before jumps away from the cut were smoothed
+    objective: float  # value of Eq. 16, before φ was made continuous away from the cut
     bound: float  # a lower bound of the objective
     gap: float  # relative difference of the objective and its bound
-    rounds: int
+    rounds: int  # iterations of the minimisation
     continuous: bool  # whether there is no cut
     largest_jump: float
     cut_length: float  # total length of all cuts

@@ -1,7 +1,7 @@
-"""The protocols between domains and the method.
+"""Protocols between domains and the signed heat method.
 
-To lower a domain is to make the `Discretization` on which the method computes; `discretize` does it for every type of
-domain. The method (`method.py`) is written once, for discretisations, and does not depend on any domain.
+To lower a domain means to make the `Discretization` on which the method computes. `discretize` does that for every type
+of domain. The method (`method.py`) is written once, for discretisations, and does not depend on any domain.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from .shapes.exchange import ACCEPTED_SHAPES
 
 
 class SourceTerm(Protocol):
-    """Sources lowered to one discretisation: in the form in which the method takes them."""
+    """Sources lowered to one discretisation with n unknowns, as s samples with their normals."""
 
     @property
     def vectors(self) -> Any: ...  # X₀ of Eq. 12 (on surfaces Eq. 11, Eq. 19), in the discretisation's own layout
@@ -36,63 +36,65 @@ class SourceTerm(Protocol):
 
 
 class Integration(Protocol):
-    """Step 3 on one discretisation: solves ``C φ = b`` with and without constraints.
+    """Step 3 of the method on one discretisation, which solves ``C φ = b`` with and without constraints.
 
-    Without absolute levels φ is determined up to a constant on each connected component of the domain; the φ returned
-    has a weighted mean of zero over the source samples of each component. Components without samples are NaN.
+    All methods return φ at the unknowns, (n,), and take b, the divergence of Y. Without absolute levels, φ is
+    determined up to a constant on each connected component of the domain. It is then shifted so that its weighted mean
+    over the source samples of each component is zero. φ is NaN on components without samples.
     """
 
     @property
     def soft_weight(self) -> float:
-        """λ of `Soft` where none is given, in 1/length."""
+        """Default weight λ of the constraint `Soft`, in 1/length."""
 
     def solve(self, divergence: Any, source: Any) -> Floats:
-        """Minimise ∫|∇φ − Y|² (Eq. 2) with nothing imposed: ``C φ = b`` (Eq. 13)."""
+        """Minimise ∫|∇φ − Y|² (Eq. 2) without constraint, by solving ``C φ = b`` (Eq. 13)."""
 
     def solve_many(self, divergences: Iterable[Any], sources: Sequence[Any]) -> Iterable[Floats]:
-        """Solve for several sources, together if that is faster, else as `SolvesEach` does."""
+        """Yield `solve` for several sources, computed together if that is faster."""
 
     def fit(self, divergence: Any, source: Any, levels: Levels) -> Floats:
-        """Impose levels at the samples (Eq. 14), in the way that suits the domain best."""
+        """Solve step 3 with levels imposed at the samples (Eq. 14), only approximately where that suits the domain."""
 
     def fit_exactly(self, divergence: Any, source: Any, levels: Levels) -> Floats:
-        """Impose levels at the samples exactly (Eq. 14), as far as the rows of A do not contradict each other."""
+        """Solve step 3 with levels imposed exactly (Eq. 14), as far as the rows of A do not contradict each other."""
 
     def penalize(self, divergence: Any, source: Any, strength: float) -> Floats:
         """Minimise ∫|∇φ − Y|² + strength · Σ weight · φ(sample)² (Sec. 7.1, Fig. 11)."""
 
 
 class Adaptable(Protocol):
-    """Something that becomes a discretisation once the sources are known."""
+    """An object that becomes a discretisation once the sources are known."""
 
     def adapt(self, sources: Sequence[Any]) -> tuple[Discretization, Sequence[Any]]:
-        """Return a discretisation that can represent these sources, and the sources on it: usually ``(self, sources)``.
+        """Return a discretisation that can represent these sources, and the sources on it.
 
-        Unoriented curves inside faces of a surface, for instance, need edges that run along them.
+        Usually that is ``(self, sources)``. But unoriented curves inside faces of a surface, for instance, need edges
+        that run along them.
         """
 
 
 class Discretization(Adaptable, Protocol):
-    """A domain as the method needs it: it lowers sources, and performs each of the three steps for them."""
+    """A domain as the method needs it, which lowers sources and performs the three steps for them."""
 
     @property
     def integration(self) -> Integration:
-        """Step 3."""
+        """The object that solves step 3."""
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> SourceTerm:
-        """Lower sources to this discretisation; `diffusion` is τ in ``t = τ h²``."""
+        """Lower sources to this discretisation, for the diffusion time ``t = τ h²`` with τ the `diffusion`."""
 
     def diffuse(self, source: Any) -> Any:
-        """Solve ``(M + tL) X = X₀`` (Eq. 12); directions stay right however small X becomes."""
+        """Return X with ``(M + tL) X = X₀`` (Eq. 12). Its directions are accurate however small it is far away."""
 
     def diffuse_many(self, sources: Sequence[SourceTerm]) -> Iterable[Any]:
-        """Diffuse several sources of one τ, together if that is faster, else as `DiffusesEach` does."""
+        """Yield `diffuse` of several sources with the same τ, computed together if that is faster."""
 
     def to_cells(self, vectors: Any) -> NDArray[Any]:
-        """Return X at the cells in which ∇φ is computed: complex numbers on surfaces, rows of components in space."""
+        """Return X at the cells in which ∇φ is computed, as complex numbers on surfaces, and as rows in space."""
 
     def divergence(self, directions: NDArray[Any]) -> Any:
-        """Return b, the right-hand side of ``C φ = b``."""
+        """Return b, the right-hand side of ``C φ = b``, for unit vectors Y at the cells."""
 
 
 class DiffusesEach:
@@ -115,19 +117,20 @@ class SolvesEach:
 class Levels:
     """The levels that a constraint imposes on φ at the source samples."""
 
-    values: Floats  # (s,) absolute, or, with groups, up to an unknown constant per group
+    values: Floats  # (s,) φ at each sample; with groups, up to an unknown constant for each group
     groups: Ints | None = None  # (s,) group of each sample
 
-    def at(self, places: Any) -> Levels:
-        """Average levels by an (r, s) sparse matrix, each row of which weights samples of a single group."""
+    def at(self, averages: Any) -> Levels:
+        """Return r averaged levels, by an (r, s) sparse matrix whose rows each average samples of a single group."""
         return Levels(
-            places @ self.values, None if self.groups is None else self.groups[places.indices[places.indptr[:-1]]]
+            averages @ self.values,
+            None if self.groups is None else self.groups[averages.indices[averages.indptr[:-1]]],
         )
 
 
 @singledispatch
 def discretize(domain: Any) -> Discretization:
-    """Lower a domain to its discretisation; every kind of domain registers a function of its own."""
+    """Make the discretisation of a domain. Every type of domain registers a function of its own."""
     raise UnsupportedTypeError(
         f"{type(domain).__name__} is not a domain", remedy=f"use a Grid, or {ACCEPTED_SHAPES}", element="domain"
     )

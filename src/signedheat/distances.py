@@ -37,7 +37,7 @@ from .tets.tet_mesh import TetMesh
 from .validation import are_points, positive_number, public_call, refuse_beside
 
 OF_DEFAULT_GRID = ("resolution", "spacing", "padding")
-"""Options of `signed_distance` that make the default grid."""
+"""Options of `signed_distance` that define the default grid, and are refused if a domain is given."""
 
 
 @overload
@@ -148,11 +148,13 @@ def signed_distance(
 ) -> Field:
     """Compute the signed distance to a broken shape, which is exact up to the completion of missing parts.
 
-    Shapes in space are completed (`complete`), and distance is measured to the shape and its completion. Closed
-    outlines in the plane are filled. For curves on a surface, and other drawings in the plane, strokes are flipped so
-    that they bound something together, and those that bound nothing are left out. The zero set of the signed heat
-    method replaces missing curves, and distance is measured along the surface. `SignedHeatSolver` runs the method
-    alone.
+    * Shapes in space are completed (`complete`). Distance is measured to the given faces and to the completion.
+    * Closed outlines in the plane are filled.
+    * Curves on a surface, and other drawings in the plane, are flipped so that they bound something together. Those
+      that bound nothing are left out, and the zero set of the signed heat method closes gaps. On a surface, distance is
+      measured along it.
+
+    `SignedHeatSolver` runs the signed heat method alone.
 
     Parameters
     ----------
@@ -161,43 +163,44 @@ def signed_distance(
         object of trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces). On a surface, `Curve` and
         `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In the plane, `Polyline`.
     domain : Grid, TetMesh or surface, optional
-        Where distance is computed. By default, a grid of cubic cells around the shape or drawing. Curves need their
-        surface: a `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
+        Domain of the field. By default, a grid of cubic cells around the shape or drawing. Curves need their surface,
+        a `TriangleMesh`, `PolygonMesh`, `PointCloud`, `DigitalSurface` or `IntrinsicTriangulation`.
     resolution : int
-        Nodes along the longest side of the default grid; 128 by default.
+        Number of nodes along the longest side of the default grid; 128 by default.
     spacing : float or (d,) float, optional
         Distance between nodes of the default grid, in the units of the shape, in place of `resolution`.
     padding : float, optional
-        Room around the shape, in its units; by default a fifth of its longest side.
+        Room between the shape and the sides of the default grid, in units of the shape; by default a fifth of its
+        longest side.
     band : float, optional
-        In space: compute only nodes of the grid whose distance is at most this length, in the units of the shape.
+        In space, compute only nodes of the grid whose distance is at most this length, in the units of the shape.
     completion, lids, nested : str
-        In space: see `complete`. With ``completion="none"``, distance is unsigned and only to what is there, also on
-        surfaces and in the plane: for clothes, and for networks of curves.
+        In space, options of `complete`. With ``completion="none"``, also on surfaces and in the plane, nothing is
+        completed and distance is unsigned. That suits clothes and networks of curves.
     constraint : Free, ZeroSet or Soft, optional
         Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float, optional
-        τ in ``t = τ h²``, 1 by default, if the signed heat method is used. For this time normals of the source are
-        diffused like heat, with h the size of cells or triangles. Larger values close gaps more roundly.
+        Factor τ of the time ``t = τ h²`` for which the signed heat method diffuses normals of the source like heat,
+        with h the size of cells or triangles; 1 by default. Larger values close gaps more roundly.
     fill : {"nonzero", "evenodd"}
-        In the plane: the filling rule of closed outlines, as in SVG.
+        In the plane, the filling rule of closed outlines, as in SVG.
     as_oriented : bool
-        Flip and fill nothing, and leave no curve out.
+        If true, no face or curve is flipped, no outline is filled, and no curve is left out.
     keep_overlaps : bool
-        In space: keep surfaces that lie inside other bodies.
+        In space, keep surfaces that lie inside other bodies.
     every_piece : bool
-        On surfaces and in the plane: leave no curve out.
+        On surfaces and in the plane, leave no curve out.
     intrinsic : "auto", True or False
-        On surfaces: whether to use an intrinsic triangulation, see `SignedHeatSolver`.
+        On surfaces, whether to use an intrinsic triangulation, as for `SignedHeatSolver`.
     progress : callable, optional
         Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
     Returns
     -------
     Field
-        φ, in the units of the source, is negative inside shapes and filled outlines, and to the right of curves and
-        strokes. It is positive on both sides of sheets, which bound nothing. ``diagnostics.notes`` say what was
-        flipped, left out and completed.
+        Signed distance φ in the units of the source. It is negative inside shapes and filled outlines, and to the right
+        of curves and strokes. It is positive on both sides of sheets, which bound nothing. ``diagnostics.notes`` say
+        what was flipped, left out and completed.
 
     Raises
     ------
@@ -208,7 +211,7 @@ def signed_distance(
     GeometryError
         If resolution, spacing and padding do not define a grid.
     MemoryLimitError
-        If the grid does not fit in memory: known once the shape is complete, before the field is allocated.
+        If the grid does not fit in memory. This is checked after the completion, before the field is allocated.
     UnsupportedTypeError
         If an option does not apply to this kind of source, or to a domain that is given.
 
@@ -271,7 +274,8 @@ DEFAULTS = {
     for parameter in inspect.signature(signed_distance).parameters.values()
     if parameter.kind is parameter.KEYWORD_ONLY
 }
-"""Options of `signed_distance`; those that differ from these must be options for this kind of source, too."""
+"""Options of `signed_distance` with their defaults. An option that differs from its default is refused if it does not
+apply to the kind of source."""
 
 
 def distance_to_solid(
@@ -284,14 +288,17 @@ def distance_to_solid(
     band: float | None = None,
     progress: Progress | None = None,
 ) -> Field[Grid] | Field[TetMesh]:
-    """Compute the signed distance to a solid: see `signed_distance`."""
+    """Compute the signed distance to a solid on a grid or on tets, with the options of `signed_distance`."""
     if domain is None or isinstance(domain, Grid):
         return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
     return completed_distance(solid, domain, Completion(), Heat(), band, progress)
 
 
 def is_plain(plain: bool, method: Heat) -> bool:
-    """Whether the method runs alone: if `plain`, or if the constraint allows levels other than zero on the shape."""
+    """Whether the signed heat method runs without completion.
+
+    It does if `plain`, or if the constraint allows levels other than zero on the shape.
+    """
     return plain or isinstance(method.constraint, EachComponent | LevelValues)
 
 
@@ -304,7 +311,11 @@ def measured_distance(
     progress: Progress | None = None,
     **in_band: Any,
 ) -> Any:
-    """Measure distance to a shape or to lines; if `is_plain`, by the method alone, on the oriented shape."""
+    """Return the field of the signed distance to a shape or to lines on a grid or on tets.
+
+    If `is_plain`, it is that of the signed heat method alone, after the faces of a mesh have been oriented. `in_band`
+    are further options of `completed_distance`.
+    """
     if is_plain(plain, method):
         if isinstance(shape, TriangleMesh | PolygonMesh) and not options.as_oriented:
             shape = orient(shape)
@@ -325,7 +336,7 @@ def grid_around(
 
 
 def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
-    """Choose the function that measures distance to a source on a domain."""
+    """Return the function that computes distance to this kind of source on this kind of domain; raise if none does."""
     _refuse_points(source, domain)
     sources = as_shapes(source)
     if isinstance(domain, Grid):
@@ -349,7 +360,7 @@ def _measure(source: object, domain: Domain | None) -> Callable[..., Field]:
 
 
 def _without_sides(source: Any) -> Any:
-    """Return curves, or sequences of them, as unoriented ones, so that distance has no sign; others as they are."""
+    """Make curves, also in nested sequences, unoriented, so that distance to them has no sign; return others as is."""
     if isinstance(source, Curve):
         return Curve(source.faces, source.barycentric, source.closed, oriented=False)
     if isinstance(source, Sequence) and all(isinstance(item, Curve | SurfacePoints | Sequence) for item in source):
@@ -358,7 +369,7 @@ def _without_sides(source: Any) -> Any:
 
 
 def _refuse_points(source: object, domain: object) -> None:
-    """Raise if the distance of points to a shape is asked for, in either order."""
+    """Raise an error if the arguments of `signed_distance` are points and a shape, in either order."""
     for points, shape in ((source, domain), (domain, source)):
         if are_points(points) and isinstance(converted(shape), TriangleMesh | PolygonMesh | Solid):
             raise UnsupportedTypeError(
@@ -369,7 +380,7 @@ def _refuse_points(source: object, domain: object) -> None:
 
 
 def _refuse_other_dimension(sources: Sequence[Any], grid: Grid) -> None:
-    """Raise if a source does not lie in as many dimensions as a grid has axes."""
+    """Raise an error if a source does not have as many dimensions as a grid has axes."""
     for index, source in enumerate(sources):
         dimension = source.bounds.shape[1] if hasattr(source, "bounds") else grid.dimension
         if dimension != grid.dimension:
@@ -397,7 +408,7 @@ def distance_to_shapes(
     keep_overlaps: bool = False,
     progress: Progress | None = None,
 ) -> Field[Grid] | Field[TetMesh]:
-    """Compute the signed distance to shapes in space: see `signed_distance`."""
+    """Compute the signed distance to shapes in space on a grid or on tets, with the options of `signed_distance`."""
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
     method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
     joined = joined_shape(shape)
@@ -415,7 +426,10 @@ def completed_distance(
     progress: Progress | None = None,
     **tiles: Any,
 ) -> Field[Grid] | Field[TetMesh]:
-    """Complete a shape, then measure distance to the solid: on a grid by `Solid.field`, or at the vertices of tets."""
+    """Complete a shape, and return the field of the signed distance to the solid on a grid or on tets.
+
+    `band` and `tiles` are options of `Solid.field`, which computes it on grids.
+    """
     if band is not None and not isinstance(domain, Grid):
         raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
     solid = completed(shape, options, method, within(progress, 0.0, 0.5))

@@ -15,15 +15,16 @@ __all__ = [
 ]  # fmt: skip
 
 LONGEST_TEXT = 600
-"""Characters of a cause, a remedy, an element or a warning, which may quote names and contents of files."""
+"""Number of characters up to which causes, remedies, elements and warnings are kept; longer ones are cut off. They may
+quote names and contents of files."""
 
 
 ENDINGS = {"ex": "ices", "y": "ies", "sh": "shes", "x": "xes"}
-"""Plurals other than by s, by the endings of nouns."""
+"""Plural endings of nouns by the endings of their singulars, as in "vertex" and "vertices". Others get an s."""
 
 
 def counted(n: int, noun: str) -> str:
-    """Write a count with its noun.
+    """Return a text of a count and a noun, in the plural unless the count is 1.
 
     Examples
     --------
@@ -37,7 +38,7 @@ def counted(n: int, noun: str) -> str:
 
 
 def percent(share: float, digits: int = 3) -> str:
-    """Write a share in percent.
+    """Return a text for a share, from 0 to 1, in percent, with at most `digits` significant digits.
 
     Examples
     --------
@@ -48,10 +49,10 @@ def percent(share: float, digits: int = 3) -> str:
 
 
 class Sentence(Formatter):
-    """Formats shares as ``{:%}``, and counts by their nouns, such as ``{:face}``."""
+    """Formatter of messages, with ``{:%}`` for shares in percent, and a noun as in ``{:face}`` for counts."""
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        """Write a value as its place in the sentence asks for."""
+        """Return the text for a value. The specification is ``%``, a noun, or one of Python's."""
         if format_spec == "%":
             return percent(value)
         return (
@@ -189,7 +190,7 @@ class CancellingNormalsError(SourceError):
 
 
 class ConstraintError(SignedHeatError):
-    """A constraint that does not fit the sources, for instance the wrong number of level values.
+    """A constraint does not fit the sources, for instance because of the wrong number of level values.
 
     See Also
     --------

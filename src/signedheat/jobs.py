@@ -1,4 +1,4 @@
-"""Jobs on threads or in new processes, with time limits; and the time and progress of the steps of a computation."""
+"""Jobs on threads or in new processes, with time limits, and a stopwatch that reports progress."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ CLEAR_LINE = "\r\x1b[2K"
 """Escape sequence that clears the current line of a terminal."""
 
 Progress = Callable[[float, str], None]
-"""Called with the fraction done, from 0 to 1, and the name of the step that begins."""
+"""A function that is called with the fraction done, from 0 to 1, and the name of the step that begins."""
 
 
 class Announcement:
-    """A message that is logged once per process, and printed on standard error in terminals and notebooks.
+    """A message that a call logs, and prints on standard error in terminals and notebooks, once per process.
 
-    Where people would wait without knowing for what, it is printed everywhere (`everywhere`).
+    If `everywhere`, it is printed even if standard error is redirected.
     """
 
     are_wanted = True
@@ -55,19 +55,22 @@ class Announcement:
 
 
 class Stopwatch:
-    """Measures the time of named steps, logs it, and reports progress."""
+    """Measures and logs the seconds that each of several named steps takes, and reports progress."""
 
     def __init__(self, progress: Progress | None, steps: int) -> None:
         self.seconds: dict[str, float] = {}
         self._progress, self._steps = progress, steps
 
     def skip(self, steps: int) -> None:
-        """Reduce the number of expected steps."""
+        """Reduce the number of expected steps by `steps`."""
         self._steps -= steps
 
     @contextmanager
     def __call__(self, step: str) -> Iterator[Callable[[Callable[[], Result]], Result]]:
-        """Time a step; the yielded function runs jobs, during which progress is reported and may raise to cancel."""
+        """Time the ``with`` block of a step, and yield a function that runs a job.
+
+        While a job runs, progress is reported again and again, and may raise an exception to cancel.
+        """
         progress, share, report = self._progress, len(self.seconds) / self._steps, None
         if progress is not None:
             progress(share, step)
@@ -81,7 +84,7 @@ class Stopwatch:
 
 
 def within(progress: Progress | None, start: float, stop: float) -> Progress | None:
-    """Return a callback for the progress of a part of a computation, which reports `start` to `stop` of the whole."""
+    """Return the callback for a part of a computation, whose fractions 0 to 1 are `start` to `stop` of the whole."""
     if progress is None:
         return None
     whole = progress
@@ -89,7 +92,7 @@ def within(progress: Progress | None, start: float, stop: float) -> Progress | N
 
 
 def growing(progress: Progress | None) -> Progress | None:
-    """Return a callback that reports the largest fraction so far, where parts of a computation may be done again."""
+    """Return a callback that reports the largest fraction so far, so that progress never goes back."""
     if progress is None:
         return None
     whole, most = progress, 0.0
@@ -115,17 +118,17 @@ class Abandoned(BaseException):
 
 @dataclass(eq=False)
 class Flag:
-    """Tells a thread, and those that it starts, whether anybody waits for its result."""
+    """Tells a thread, and the threads that it starts, whether its result is still awaited."""
 
-    parent: Flag | None
-    is_raised: bool = False
+    parent: Flag | None  # the flag of the thread that started it
+    is_raised: bool = False  # whether nobody waits for the result any more
 
 
 _thread = threading.local()
 
 
 def own_flag() -> Flag:
-    """Return a new flag for jobs that this thread starts."""
+    """Return a new flag for a job that this thread starts, with the flag of this thread as parent."""
     return Flag(getattr(_thread, "flag", None))
 
 
@@ -139,7 +142,7 @@ def stop_if_abandoned() -> None:
 
 
 def start_thread(job: Callable[[], None], flag: Flag) -> Thread:
-    """Start a job on a thread that obeys a flag, and that does not keep the process alive."""
+    """Start a job on a daemon thread, which `stop_if_abandoned` ends once the flag is raised."""
 
     def run() -> None:
         _thread.flag = flag
@@ -151,7 +154,7 @@ def start_thread(job: Callable[[], None], flag: Flag) -> Thread:
 
 
 def settle(future: Future[Any], job: Callable[[], Any]) -> None:
-    """Run a job, and store its result or its exception."""
+    """Run a job, and store its result or its exception in a future."""
     try:
         future.set_result(job())
     except BaseException as error:
@@ -159,7 +162,10 @@ def settle(future: Future[Any], job: Callable[[], Any]) -> None:
 
 
 def awaited(future: Future[Result], report: Callable[[], None] = stop_if_abandoned) -> Result:
-    """Wait for a result and call `report` every tenth of a second; what it raises, and Ctrl-C, ends the wait."""
+    """Wait for the result of a future, and call `report` every tenth of a second.
+
+    An exception that `report` raises, and Ctrl-C, end the wait.
+    """
     while True:
         try:
             return future.result(0.1)
@@ -188,7 +194,7 @@ def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -
 
 @contextmanager
 def briefly() -> Iterator[None]:
-    """Call compiled code within a ``with`` block directly, which saves the time to start a thread."""
+    """Within a ``with`` block, let `interruptible` call functions directly, which saves the start of a thread."""
     before = getattr(_thread, "is_brief", False)
     _thread.is_brief = True
     try:
@@ -198,10 +204,10 @@ def briefly() -> Iterator[None]:
 
 
 def interruptible(function: Callable[..., Result], *arguments: Any, **named: Any) -> Result:
-    """Call a function of compiled code, which cannot be interrupted, so that Ctrl-C ends the wait for it.
+    """Call a compiled function in such a way that Ctrl-C ends the wait for it, although it cannot be interrupted.
 
-    Python handles signals on its main thread, between two instructions. There, the function runs on another thread.
-    After Ctrl-C it runs on to its end, which nobody waits for, and keeps alive what it uses.
+    Python handles signals on its main thread, between two instructions. A call from the main thread therefore runs on
+    another thread. After Ctrl-C that thread continues to the end of the function, and nobody waits for it.
     """
     stop_if_abandoned()
     if threading.get_ident() != threading.main_thread().ident or getattr(_thread, "is_brief", False):
@@ -230,9 +236,10 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
 
 
 def command_for(entry: str, *arguments: str) -> list[str]:
-    """Make the command that calls a function, as ``"module:name"``, in a new Python process.
+    """Return the command line of a Python process that calls the function `entry`, written "module:name".
 
-    It can import what this one can, and nothing from the current folder, which ``python -c`` would search first.
+    The process imports modules from the same folders as this one, but never from the current folder, which
+    ``python -c`` would search first.
     """
     path = [os.path.abspath(folder) for folder in sys.path if folder]
     return [sys.executable, "-I", "-c", ENTRY_PROGRAM, json.dumps(path), entry, *arguments]

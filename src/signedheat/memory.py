@@ -1,4 +1,4 @@
-"""Available memory: what the machine and the limits of this process leave."""
+"""Memory that is available to this process, and errors if an array would not fit."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ CGROUPS = Path("/proc/self/cgroup")
 CGROUP_ROOT = Path("/sys/fs/cgroup")
 """Folder of control groups of version 2; its subfolder ``memory`` has those of version 1."""
 CGROUP_FILES = {"": ("memory.max", "memory.current"), "memory": ("memory.limit_in_bytes", "memory.usage_in_bytes")}
-"""Names of the files with the limit and the usage of a group, by the controllers in its line: versions 2 and 1."""
+"""Names of the files with the limit and the usage of a group, by the controllers in its line, which are "" in version 2
+and "memory" in version 1."""
 BYTES_UNLOADED, BYTES_IMPORTED, BYTES_LOADED = 45_000_000, 24_000_000, 7_000_000
-"""Bytes that libraries will still allocate: before Numba is imported, after that, and after the first kernel. Cached
+"""Bytes that libraries will still allocate before Numba is imported, after that, and after the first kernel. Cached
 files of libraries, 75 to 140 MB, are not counted, since the system can free them."""
 BYTES_MAPPED = {"VmSize": 685_000_000, "VmData": 165_000_000}
 """Bytes that libraries map but hardly touch; they count towards limits on address space and data."""
 REMEDY_MARGIN = 1.1
-"""Safety factor of the size that an error suggests, since free memory changes between calls."""
+"""Factor by which the size that an error suggests is below what fits, since free memory changes between calls."""
 
 
 def libraries() -> int:
@@ -42,7 +43,11 @@ def libraries() -> int:
 
 
 def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
-    """Raise `MemoryLimitError` if there is not enough memory for `count` elements."""
+    """Raise `MemoryLimitError` if there is not enough memory for `count` elements.
+
+    ``estimate(count)`` returns the bytes that so many elements need. ``remedy(count)`` returns a text for the number of
+    elements that would fit. The message begins with `what`, a noun such as "the grid".
+    """
     available = available_memory()
     needed = estimate(count) + libraries()
     if available is None or needed <= available:
@@ -54,9 +59,9 @@ def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float]
 
 
 def within_memory(function: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a public function so that an allocation that fails within it raises a `MemoryLimitError`.
+    """Decorate a public function so that a `MemoryError` within it becomes a `MemoryLimitError`.
 
-    The largest allocations are estimated and refused in advance; this is for all others.
+    `refuse_beyond_memory` prevents the largest allocations. This is for all others.
 
     Examples
     --------
@@ -79,9 +84,9 @@ def within_memory(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Allocate zeros whose pages take memory only once they are written.
+    """Return an array of zeros whose small pages take memory only once they are written.
 
-    `numpy.zeros` uses pages of 2 MB, and a surface through a grid would touch most of them.
+    `numpy.zeros` may use pages of 2 MB. Writing values near a surface in a grid would touch most of these.
     """
     count = math.prod(shape)
     if count == 0:
@@ -91,7 +96,7 @@ def untouched_zeros(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def fitting_count(count: int, estimate: Callable[[int], float], available: float) -> int:
-    """Find the largest number of elements, up to `count`, whose estimated memory is at most `available`."""
+    """Return the largest number of elements, up to `count`, whose estimated memory is at most `available` bytes."""
     low, high = 0, count
     while low < high:
         middle = (low + high + 1) // 2
@@ -100,7 +105,7 @@ def fitting_count(count: int, estimate: Callable[[int], float], available: float
 
 
 def available_memory() -> int | None:
-    """Return the bytes left to this process by free memory, control groups and ``ulimit``; None if unknown."""
+    """Return the bytes that free memory, control groups and ``ulimit`` leave to this process; None if unknown."""
     limits = [bound for bound in (_free(), *_containers(), *_own_limits()) if bound is not None]
     return max(min(limits), 0) if limits else None
 
@@ -113,37 +118,41 @@ def _free() -> int | None:
 
 def _containers() -> list[int]:
     """Return the bytes that each control group around this process leaves, from its own up to the root."""
-    left = []
+    remaining = []
     for limit_file, used_file, details in _files_of_groups(_text(CGROUPS), CGROUP_ROOT):
         limit = _text(limit_file).strip()
         used = _text(used_file).strip() if limit.isdigit() else ""
         if used.isdigit():
-            left.append(int(limit) - int(used) + _cached(details))
-    return left
+            remaining.append(int(limit) - int(used) + _cached(details))
+    return remaining
 
 
 @cache
 def _files_of_groups(listed: str, folder: Path) -> list[tuple[str, str, str]]:
-    """Return the files with the limit, the usage and the details of each control group around this process."""
+    """Return paths of the files with the limit, the usage and the details of each control group around this process.
+
+    `listed` is the text of `CGROUPS`, and `folder` the root of control groups.
+    """
     lines = [line.split(":", 2) for line in listed.splitlines() if line.count(":") > 1]
     own = {controllers: path for _, controllers, path in lines}
-    found = []
+    paths = []
     for controllers, (limit, used) in CGROUP_FILES.items():
         root = folder / controllers
         group = root / own.get(controllers, "/").lstrip("/")
-        for place in (group, *(parent for parent in group.parents if parent.is_relative_to(root))):
-            found.append((str(place / limit), str(place / used), str(place / "memory.stat")))
-    return found
+        for level in (group, *(parent for parent in group.parents if parent.is_relative_to(root))):
+            paths.append((str(level / limit), str(level / used), str(level / "memory.stat")))
+    return paths
 
 
 def _cached(details: str) -> int:
-    """Return the bytes of cached files in a group, which the system can free."""
+    """Return the bytes of cached files in a control group, which the system can free, from its file `details`."""
     words = dict(line.split(maxsplit=1) for line in _text(details).splitlines() if " " in line)
     total = "total_" if "total_inactive_file" in words else ""
     return sum(int(words.get(f"{total}{name}", 0)) for name in ("inactive_file", "active_file"))
 
 
 def _own_limits() -> list[int]:
+    """Return the bytes that each limit of this process on address space or data (``ulimit``) leaves."""
     if sys.platform == "win32":
         return []
     import resource
@@ -169,6 +178,6 @@ def _text(path: Path | str) -> str:
 
 
 def _fields(path: str) -> dict[str, int]:
-    """Read whole numbers by name from lines like ``MemAvailable:  1024 kB`` of a system file."""
+    """Return whole numbers by name from lines like ``MemAvailable:  1024 kB`` of a system file."""
     pairs = (line.split(":", 1) for line in _text(path).splitlines() if ":" in line)
     return {name: int(words[0]) for name, rest in pairs if (words := rest.split()) and words[0].isdigit()}

@@ -17,24 +17,27 @@ from .mesh.unit_vectors import unit
 
 
 def diffuse(discretization: Discretization, source: SourceTerm) -> Any:
-    """Step 1: solve ``(M + tL) X = X₀`` (Eq. 12), the heat equation of Eq. 1 by one step of backward Euler."""
+    """Step 1: return X with ``(M + tL) X = X₀`` (Eq. 12), one backward Euler step of the heat equation (Eq. 1)."""
     return discretization.diffuse(source)
 
 
 def diffuse_many(discretization: Discretization, sources: Sequence[SourceTerm]) -> Iterable[Any]:
-    """Step 1 for several sources of the same τ, together where the discretisation can do that."""
+    """Step 1 for several sources of the same τ; the discretisation may solve for them together."""
     return discretization.diffuse_many(sources)
 
 
 def normalize(discretization: Discretization, vectors: Any) -> NDArray[Any]:
-    """Step 2: ``Y = X / |X|`` on every cell (Sec. 6). Cells that nothing reached keep Y = 0."""
+    """Step 2: return ``Y = X / |X|`` on every cell (Sec. 6), and 0 where X is 0."""
     return unit(discretization.to_cells(vectors), overwrite=True)
 
 
 def integrate(
     discretization: Discretization, directions: NDArray[Any], source: SourceTerm, constraint: Constraint
 ) -> Floats:
-    """Step 3: solve ``C φ = b`` (Eq. 13), b the divergence of Y, under a constraint (Eq. 14). Minimises Eq. 2."""
+    """Step 3: return (n,) φ that minimises Eq. 2, by solving ``C φ = b`` (Eq. 13) under a constraint (Eq. 14).
+
+    b is the divergence of the unit vectors Y on cells, `directions`.
+    """
     return constraint.integrate(discretization.integration, discretization.divergence(directions), source)
 
 
@@ -44,9 +47,9 @@ def integrate_many(
     sources: Sequence[SourceTerm],
     constraint: Constraint,
 ) -> Iterable[Floats]:
-    """Step 3 for several sources, together where nothing is imposed and the discretisation can do that."""
+    """Step 3 for several sources; without constraint, the discretisation may solve for them together."""
     if isinstance(constraint, Free):
-        divergences = (discretization.divergence(each) for each in directions)
+        divergences = (discretization.divergence(vectors) for vectors in directions)
         return discretization.integration.solve_many(divergences, sources)
-    each = zip(directions, sources, strict=True)
-    return (integrate(discretization, direction, source, constraint) for direction, source in each)
+    pairs = zip(directions, sources, strict=True)
+    return (integrate(discretization, vectors, source, constraint) for vectors, source in pairs)

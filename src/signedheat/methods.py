@@ -1,6 +1,6 @@
-"""Methods of sharpening (Sec. 7.3): distance to the nearer of a source and the zero set of φ, and a convex problem.
+"""Methods of sharpening (Sec. 7.3), which make φ of the signed heat method closer to a distance.
 
-The error of the heat method is smooth and decreases slowly under refinement. Both methods remove most of it.
+The error of the heat method is smooth and decreases slowly under refinement. `Geodesic` and `Convex` remove most of it.
 """
 
 from __future__ import annotations
@@ -41,12 +41,13 @@ from .validation import finite_number, positive_number
 __all__ = ["Convex", "Extrapolated", "Geodesic"]
 
 ADDED_SLOPE_ERROR = 0.1
-"""Increase of `LinearElements.bounded_slope_error` that sharpening may cause without a warning; 0.08 on triangles."""
+"""Increase of `LinearElements.bounded_slope_error` above which sharpening warns that the field became worse. On
+triangles it is 0.08 at most."""
 
 
 @dataclass(frozen=True, eq=False)
 class LinearElements:
-    """Linear finite elements on triangles or tets."""
+    """Linear finite elements on m triangles (d = 2) or tets (d = 3), with n unknowns at their corners."""
 
     corners: Ints  # (m, d + 1) unknown at each corner of each cell
     sizes: Floats  # (m,) areas or volumes of the cells
@@ -54,7 +55,7 @@ class LinearElements:
 
     @classmethod
     def of(cls, corners: Ints, sizes: Floats, hats: Floats, n: int) -> LinearElements:
-        """Make elements from (m, d + 1, d) gradients, those of the hat functions of each cell."""
+        """Make elements from the (m, d + 1, d) gradients of the hat functions at the corners of each cell."""
         m, k = corners.shape
         d = hats.shape[2]
         columns = np.repeat(corners[:, None], d, axis=1)
@@ -70,44 +71,45 @@ class LinearElements:
 
     @classmethod
     def on_tets(cls, tets: Tetrahedra, corners: Ints, n: int) -> LinearElements:
-        """Make the elements of a tet mesh; thin tets have a reduced weight, as they have in C, and flat ones none."""
+        """Make the elements of a tet mesh. Thin tets have a reduced weight, as in the matrix C, and flat ones none."""
         flat = tets.thickness < 1e-10
         hats = tets.area_vectors / np.where(flat, -np.inf, -3.0 * tets.volumes)[:, None, None]
         return cls.of(corners, np.where(flat, 0.0, tets.weights * tets.volumes), hats, n)
 
     @property
     def masses(self) -> Floats:
-        """(n,) integrals of the hat functions: A_i of Eq. 18."""
+        """Integrals of the hat functions, (n,) float, which are A_i of Eq. 18."""
         share = np.repeat(self.sizes / self.corners.shape[1], self.corners.shape[1])
         return np.asarray(np.bincount(self.corners.ravel(), share, self.slope_matrix.shape[1]), np.float64)
 
     def slopes(self, values: Floats) -> Floats:
-        """(m, d) ∇φ in every cell, whose length Eq. 17 bounds by one."""
+        """Return (m, d) gradients ∇φ in every cell for (n,) values at the unknowns; Eq. 17 bounds their length by 1."""
         return np.asarray(self.slope_matrix @ values).reshape(len(self.sizes), -1)
 
     def divergence(self, vectors: Floats) -> Floats:
-        """b of Eq. 13, ``b_i = ∫ ⟨∇λ_i, Y⟩``, for one vector per cell."""
+        """Return b of Eq. 13, (n,), with ``b_i = ∫ ⟨∇λ_i, Y⟩``, for vectors Y in cells, (m, d)."""
         return self.slope_matrix.T @ (self.sizes[:, None] * vectors).ravel()
 
     def slope_error(self, values: Floats) -> float:
-        """Root mean square of ``|∇φ| − 1`` over the cells in which φ is known."""
+        """Return the root mean square of ``|∇φ| − 1`` over the cells in which the (n,) values are not NaN."""
         return float(np.sqrt(self._mean((np.linalg.norm(self.slopes(values), axis=1) - 1.0) ** 2)))
 
     def bounded_slope_error(self, values: Floats) -> float:
-        """Mean of ``min(| |∇φ| − 1 |, 1)``, which depends little on flat cells and on the kinks of a distance."""
+        """Return the mean of ``min(| |∇φ| − 1 |, 1)`` over these cells; flat cells and kinks change it little."""
         return self._mean(np.minimum(np.abs(np.linalg.norm(self.slopes(values), axis=1) - 1.0), 1.0))
 
     def _mean(self, errors: Floats) -> float:
+        """Return the mean of (m,) errors in cells, weighted by size, over those that are finite; NaN if none is."""
         finite = np.isfinite(errors) & (self.sizes > 0)
         return float(np.average(errors[finite], weights=self.sizes[finite])) if finite.any() else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Distance from each unknown to the nearer of a source and the zero set of φ."""
+    """Distance from each of n unknowns to the nearer of a source and the zero set of φ."""
 
-    distances: Floats  # (n,) unsigned; inf where the component of the domain has neither
-    sides: Ints  # (n,) 1 or −1 where the source decides the sign; 0 where φ does
+    distances: Floats  # (n,) unsigned; inf on connected components of the domain that have neither
+    sides: Ints  # (n,) sign 1 or −1 where the source decides it; 0 where the sign of φ does
     notes: tuple[Note, ...] = ()  # for the diagnostics
 
 
@@ -115,10 +117,11 @@ class Nearest:
 def nearest(
     domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, report: Report | None
 ) -> Nearest:
-    """Measure to the nearer of a source and the zero set of φ; every kind of domain registers a function of its own.
+    """Measure distance to the nearer of a source and the zero set of φ, with `values` at the unknowns.
 
-    `source` is what φ was computed from. `given`, if not None, are curves or shapes to which distance is exact, and
-    which the zero set completes. `report` is called now and then, and may raise to cancel.
+    Every type of domain registers a function of its own. `source` is the one that φ was computed from. `given`, if not
+    None, are curves or shapes to which distance is exact, and whose gaps the zero set closes. `report` is called now
+    and then, and may raise an exception to cancel.
     """
     raise UnsupportedTypeError(f"there are no straight lines on a {type(domain).__name__}", element="method")
 
@@ -126,24 +129,27 @@ def nearest(
 def distance_to_nearest(
     domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, progress: Progress | None
 ) -> tuple[Floats, tuple[Note, ...]]:
-    """Measure signed distance to the nearer of a source and the zero set; also return notes for the diagnostics."""
+    """Return (n,) signed distances to the nearer of a source and the zero set, and notes for the diagnostics.
+
+    The arguments are those of `nearest`. Unknowns that neither reaches keep their values, and NaN stays NaN.
+    """
     report = None if progress is None else lambda: progress(0.0, "sharpen")
-    places = nearest(domain, values, source, given, tolerance, report)
-    reached = np.isfinite(places.distances)
+    measured = nearest(domain, values, source, given, tolerance, report)
+    reached = np.isfinite(measured.distances)
     if not reached.any():
         raise OutsideError(
             "the field has one sign everywhere, hence no zero set to measure from",
             remedy="add an offset to its values, or use method=Convex(), which measures from the source "
             "that it was computed from",
         )
-    distances = np.where(reached, places.distances, np.abs(values))
-    signed = np.copysign(distances, np.where(places.sides != 0, places.sides, values))
-    return np.where(np.isnan(values), np.nan, signed), places.notes
+    distances = np.where(reached, measured.distances, np.abs(values))
+    signed = np.copysign(distances, np.where(measured.sides != 0, measured.sides, values))
+    return np.where(np.isnan(values), np.nan, signed), measured.notes
 
 
 @runtime_checkable
 class Method(Protocol):
-    """A method of sharpening, for fields on surfaces and tets."""
+    """Protocol of methods of sharpening, for fields on surfaces and tets."""
 
     def sharpened(
         self,
@@ -162,7 +168,7 @@ class Method(Protocol):
         elements : LinearElements
             Elements on which φ is linear.
         values : (n,) float
-            φ at the vertices.
+            φ at the unknowns of the elements, in the units of the domain.
         source : SourceTerm, optional
             The source from which φ was computed.
         progress : callable, optional
@@ -171,7 +177,7 @@ class Method(Protocol):
         Returns
         -------
         values : (n,) float
-            Sharpened values.
+            Sharpened φ at the same unknowns.
         notes : tuple of Note
             Notes for the diagnostics.
 
@@ -196,21 +202,20 @@ class Method(Protocol):
 
 @dataclass(frozen=True)
 class Geodesic(Method):
-    """Geodesic distance from the zero set of φ, with the signs of φ: the solution of Eq. 17. The default.
+    """Sharpen φ to the geodesic distance from its zero set, with the signs of φ (Eq. 17). This is the default.
 
-    On surfaces this is exact polyhedral distance, whatever the shape of the triangles. Distance to unoriented sources
-    (unoriented curves, points) is measured from these themselves, whether φ vanishes there or not; if no source is
-    oriented, distance is positive everywhere. In tet meshes it is distance along straight lines, which bend around the
-    boundary of the mesh.
+    On surfaces it is exact polyhedral distance, whatever the shape of the triangles. Distance to unoriented curves and
+    to points is measured from these themselves, even if φ is not zero there. If no source is oriented, distance is
+    positive everywhere. In tet meshes it is the length of straight lines, which bend around the boundary of the mesh.
 
-    The zero set of φ and its signs are kept, including signs that a long diffusion has made wrong. (In tets, the zero
-    set is that of a quadratic correction of the linear interpolant, which is closer to a smooth one.)
+    The zero set of φ and its signs are kept, including signs that a long diffusion has made wrong. In tets, the zero
+    set is that of a quadratic correction of the linear interpolant, which is closer to a smooth surface.
 
     Parameters
     ----------
     tolerance : float
-        On surfaces, neighbouring windows on an edge are merged if that changes distances by less than this fraction of
-        the edge. 0 is exact, and takes time proportional to the number of faces to the power of 1.5.
+        Largest change of a distance, relative to the length of an edge, by which the algorithm on surfaces may merge
+        neighbouring intervals (windows) on the edge. 0 is exact, and takes time proportional to n^1.5 for n faces.
 
     See Also
     --------
@@ -243,26 +248,28 @@ class Geodesic(Method):
 
 
 SOURCE_TOLERANCE = 0.1 * Geodesic.tolerance
-"""Tolerance of distance to curves: the order of faces then changes it by less than 1e-6 of its range."""
+"""Tolerance of `Geodesic` for distance to given curves. The order of faces then changes distances by less than 1e-6 of
+their range."""
 
 
 @dataclass(frozen=True)
 class Convex(Method):
-    """``max Σ A_i sign(φ⁰_i) φ_i`` where ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, by ADMM (Eq. 17, Eq. 18).
+    """Sharpen φ by a convex problem, whose solution has gradients of length at most 1 (Eq. 17, Eq. 18).
 
-    This corrects signs that a long diffusion has made wrong. The result is too small, since a function with gradients
-    of length at most one in every triangle or tet is a lower bound of distance: on fine meshes `Geodesic` is far more
-    accurate, and on tets the bias is larger than the error of the unsharpened field. One factorisation serves all
-    rounds (Belyaev & Fayolle 2020).
+    It maximises ``Σ A_i sign(φ⁰_i) φ_i`` under ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, where φ⁰ is the
+    given field and A_i are areas or volumes. This can correct signs that a long diffusion has made wrong. But a
+    function with such gradients is a lower bound of distance. On fine triangle meshes `Geodesic` is far more accurate,
+    and on tets the bias is larger than the error of the unsharpened field. The solver is ADMM with one factorisation
+    (Belyaev & Fayolle 2020).
 
     Parameters
     ----------
     tolerance : float
-        Stop when the root mean squares of the primal and the dual residual, both slopes, are below this.
+        Root mean square of the primal and the dual residual, without units, below which iterations end.
     max_rounds : int
-        Largest number of iterations; the residuals are in the diagnostics.
+        Largest number of iterations. The number needed and the residual are in the diagnostics.
     relaxation : float
-        Over-relaxation, from 1 to below 2.
+        Factor of over-relaxation, at least 1 and below 2.
 
     See Also
     --------
@@ -329,18 +336,18 @@ class Convex(Method):
 
 
 def at_most_one(vectors: Floats) -> Floats:
-    """Project rows on the unit ball: those longer than one are scaled to length one."""
+    """Scale rows longer than 1 to length 1."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1.0)
 
 
 def typical_size(sizes: Floats, dimension: int) -> float:
-    """Return the typical size of cells as a length: a field that varies by less counts as constant."""
+    """Return a typical length of cells, from their (m,) areas or volumes and the dimension 2 or 3."""
     return float(sizes.mean() ** (1 / dimension))
 
 
 @singledispatch
 def sharpen_on(domain: object, field: Any, source: Any, method: Method | None, progress: Progress | None) -> Field[Any]:
-    """Sharpen a field; every kind of domain registers a function of its own. `sharpen` is the public function."""
+    """Sharpen a field on a domain. Every type of domain registers a function of its own for `sharpen` to call."""
     kind = type(field if domain is None else domain).__name__
     raise UnsupportedTypeError(
         f"what lies on a {kind} cannot be sharpened", remedy="pass a field that SignedHeatSolver.distance returned"
@@ -356,7 +363,11 @@ def sharpened(
     method: Method | None,
     progress: Progress | None,
 ) -> tuple[Floats, Diagnostics]:
-    """Return the sharpened values of a field on a surface or on tets, and diagnostics with the slope errors."""
+    """Return the sharpened values of a field on a surface or on tets, and diagnostics with the slope errors.
+
+    `values` are φ at the unknowns of the elements, (n,). With a `source`, distance is measured to it, else by the
+    `method`. A warning says if sharpening made the field worse.
+    """
     if source is not None and method is not None:
         raise UnsupportedTypeError(
             "a method measures to the zero set alone", remedy="leave out the method or the source", element="method"
@@ -385,7 +396,7 @@ def sharpened(
 def timed(
     run: Callable[[], tuple[Floats, tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
 ) -> tuple[Floats, Diagnostics]:
-    """Run a function that returns values and notes; return the values, and diagnostics with the notes and its time."""
+    """Call ``run()``, which returns values and notes; return the values, and diagnostics with the notes and time."""
     begin = time.perf_counter()
     if progress is not None:
         progress(0.0, "sharpen")

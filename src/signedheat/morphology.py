@@ -1,7 +1,7 @@
-"""Morphological operations on broken shapes, by successive offsets of their signed distance (Sec. 9.3.1).
+"""Morphological operations on broken shapes, by level sets of their signed distance (Sec. 9.3.1).
 
-Each step computes the distance again, since the distance to an offset differs from that to the shape by a constant on
-one side only.
+An opening or closing computes the distance again after its first offset, since distance to an offset differs from
+distance to the shape by a constant on one side only.
 """
 
 from __future__ import annotations
@@ -70,15 +70,17 @@ __all__ = [
 Corners: TypeAlias = Literal["round", "mitre", "sharp"]
 Side: TypeAlias = Literal["outside", "inside", "both"]
 MITRE_LIMITS: dict[Corners, float] = {"round": 1.0, "mitre": 2.0, "sharp": 10.0}
-"""Largest length of mitres, relative to the distance. With 2, edges and corners of boxes stay whole, and edges between
-faces less than 60° apart are cut off; with 10, those of less than 12°."""
+"""Largest distance of a mitred edge or corner from the shape, relative to the offset; longer mitres are cut off. With
+2, edges and corners of boxes are kept, and edges between faces at less than 60° are cut off; with 10, those at less
+than 12°."""
 DRAIN_SIDES = 64
 """Number of sides of a drain hole."""
 
 Boundary: TypeAlias = TriangleMesh | list[Polyline] | list[Curve]
-"""The boundary of a result, of the same kind as the shape."""
+"""Boundary of a result: a mesh in space, polylines in the plane, or curves on a surface."""
 Measure: TypeAlias = Callable[[Sources, Domain], Field] | None
-"""Called as ``measure(shape, domain)`` for the distance whose level sets are the offsets; None for the default."""
+"""A function, called as ``measure(shape, domain)``, that returns the distance field whose level sets are the offsets.
+None stands for `signed_distance`."""
 
 
 class _Morphology(Protocol):
@@ -117,7 +119,7 @@ class _Morphology(Protocol):
 
 
 def _by_kind_of_shape(function: Callable[..., Boundary]) -> _Morphology:
-    """Make a function public, with a result whose type depends on that of the shape."""
+    """Make a function a `public_call`, and tell type checkers that the type of the shape decides that of the result."""
     return cast("_Morphology", public_call(function))
 
 
@@ -130,26 +132,27 @@ def dilate(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Dilate a shape: offset it outward by a distance.
+    """Dilate a shape, by offsetting its boundary outward by a distance.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
-        The shape, which may be broken; inside is where `signedheat.signed_distance` is negative.
+        The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        The offset, in the units of the shape; not negative.
+        Distance by which the boundary moves, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
-        Domain of the distance. By default, a grid around the shape with room for the result.
+        Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
     resolution : int, optional
         Number of nodes along the longest side of that default grid; 128 by default.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`, for instance to set its options:
+        Called as ``measure(shape, domain)`` in place of `signed_distance`, for instance to set its options as in
         ``partial(signed_distance, keep_overlaps=True)``.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The new boundary: closed, manifold, oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape. It is a mesh in space, polylines in
+        the plane, and curves on a surface.
 
     Raises
     ------
@@ -187,7 +190,7 @@ def erode(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Erode a shape: offset it inward by a distance.
+    """Erode a shape, by offsetting its boundary inward by a distance.
 
     Parameters
     ----------
@@ -243,7 +246,7 @@ def opening(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Erode, then dilate: remove parts thinner than twice the distance, and round convex corners.
+    """Erode a shape, then dilate it, which removes parts thinner than twice the distance and rounds convex corners.
 
     Parameters
     ----------
@@ -298,7 +301,7 @@ def closing(
     resolution: int | None = None,
     measure: Measure = None,
 ) -> Boundary:
-    """Dilate, then erode: fill gaps narrower than twice the distance, and round concave corners.
+    """Dilate a shape, then erode it, which fills gaps narrower than twice the distance and rounds concave corners.
 
     Parameters
     ----------
@@ -353,31 +356,32 @@ def offset(
     spacing: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> TriangleMesh:
-    """Extract the surface at a distance from a shape, which may vary over it, with round or mitred edges.
+    """Extract the offset surface of a shape, at a distance that may vary over it, with round or mitred edges.
 
     Parameters
     ----------
     shape : shape, several, or Solid
-        A shape, broken or not; completed here unless it is a solid.
+        A shape, broken or not. It is completed first, unless it is a solid.
     distance : float, (n,) float or callable
-        Positive outside, negative inside, in the units of the shape. An array has a distance for each vertex of a mesh
-        or point of a cloud, and is interpolated linearly; a function maps (n, 3) points on the shape to distances. The
-        grid has room for its values at the vertices and at some thousand points between them.
+        Distance of the surface from the shape, positive outside and negative inside, in the units of the shape. An
+        array has one for each vertex of a mesh, interpolated linearly, or for each point of a cloud. A function takes
+        (n, 3) points on the shape and returns (n,) distances. The grid has room for its values at the vertices and at
+        some thousand points between them.
     corners : {"round", "mitre", "sharp"}
-        Shape of edges where offset faces move apart. With "round", they are rounded at the distance. Else they are
-        mitred: the offset planes of the faces are extended up to two distances ("mitre", which keeps boxes) or ten
-        ("sharp").
+        Shape of edges where offset faces move apart. With "round", edges are rounded at the distance. Otherwise the
+        offset planes of the faces are extended, up to twice the distance with "mitre", which keeps the edges of boxes,
+        or up to ten times with "sharp".
     resolution : int
-        Nodes along the longest side of a grid around the surface.
+        Number of nodes along the longest side of a grid around the surface.
     spacing : float or (3,) float, optional
-        Size of the grid's cells, in place of `resolution`.
+        Size of the grid's cells, in the units of the shape, in place of `resolution`.
     progress : callable, optional
         Called as ``progress(fraction, step)``. An exception that it raises cancels.
 
     Returns
     -------
     TriangleMesh
-        A closed, manifold surface with sharp edges and corners that does not intersect itself.
+        A closed manifold mesh without self-intersections, with vertices on sharp edges and at corners of the surface.
 
     Raises
     ------
@@ -431,32 +435,34 @@ def shell(
     keep_outside: bool = False,
     drain: float | None = None,
 ) -> TriangleMesh:
-    """Make a wall: the solid between two offsets of a shape, ``inner ≤ φ ≤ outer``, in which holes are closed.
+    """Make a solid wall along a shape, between two of its offsets, where ``inner ≤ φ ≤ outer``.
 
-    Cavities smaller than a ball whose diameter is the thickness of the wall are filled. If nothing of the shape lies
-    deeper than the inner side, the shape is not hollowed, and an `InexactWarning` is issued.
+    φ is the signed distance to the shape, whose holes are closed. Cavities smaller than a ball whose diameter is the
+    thickness of the wall are filled. If no point of the shape is deeper than the inner side, the result has no cavity,
+    and an `InexactWarning` is issued.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh or PointCloud
         The shape. ``shell(shape, 0, d)`` is a wall on its outside, ``shell(shape, -d, 0)`` on its inside.
     inner, outer : float
-        Signed distances of the two sides of the wall, inner < outer.
+        Signed distances of the two sides of the wall from the shape, in its units, with inner < outer.
     domain : Grid, optional
-        By default a grid around the shape with room for the result.
+        Grid on which the distance is computed; by default one around the shape with room for the result.
     resolution : int, optional
         Number of nodes along the longest side of that default grid; 128 by default.
     measure : callable, optional
-        As in `dilate`.
+        Called as ``measure(shape, domain)`` in place of `signed_distance`, as for `dilate`.
     keep_outside : bool
-        With ``outer=0``, keep the faces of the shape and its completion, and make only the inner side.
+        If true, which needs ``outer=0``, the outer side consists of the faces of the shape and of its completion.
     drain : float, optional
-        Diameter of a hole straight down (−z) from the bottom of the largest cavity, which lets liquids and powder out.
+        Diameter of a hole, in the units of the shape, from the bottom of the largest cavity straight down (−z). It
+        lets liquids and powder out.
 
     Returns
     -------
     TriangleMesh
-        Closed and manifold, normals pointing out of the wall.
+        The boundary of the wall, closed and manifold, with normals that point out of the wall.
 
     Raises
     ------
@@ -464,7 +470,7 @@ def shell(
         If inner is not less than outer, one of them is not finite, the wall is thinner than a grid cell, `keep_outside`
         is used with an outer distance other than 0, or there is no cavity to drain.
     GeometryError
-        If faces are to be kept but do not join with their completion.
+        If `keep_outside`, and the faces of the shape do not join with their completion.
     UnsupportedTypeError
         If the domain is not a grid, or a resolution is given beside it.
 
@@ -528,7 +534,9 @@ def thicken(
     faces: ArrayLike | None = None,
     resolution: int | None = None,
 ) -> TriangleMesh:
-    """Make a solid around an open surface, with upright walls and sharp edges, without completing the surface.
+    """Make a solid of given thickness around an open surface, with walls perpendicular to it along its boundary.
+
+    Edges of the solid are sharp. The surface is not completed.
 
     Parameters
     ----------
@@ -537,14 +545,16 @@ def thicken(
     above : float
         Thickness on each side, in the units of the sheet.
     below : float, optional
-        Thickness behind the faces, if it differs; `above` is then the thickness on the side of their normals.
+        Thickness behind the faces, in the units of the sheet, if it differs. Then `above` is the thickness on the side
+        of the normals only.
     domain : Grid, optional
-        By default a grid around the sheet with room for the result.
+        Grid on which the solid is computed; by default one around the sheet with room for the result.
     side : {"outside", "inside", "both"}
-        Where to thicken if `below` is left out: on the side of the normals, behind the faces, or on both sides.
+        The side to thicken if `below` is left out. "outside" is the side of the normals, "inside" that behind the
+        faces.
     faces : (k,) int or (m,) bool, optional
-        Thicken these faces only. ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=chosen))`` adds
-        to a part.
+        Ids of the faces to thicken, or a boolean for each face. To add material to some faces of a part, write
+        ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=ids))``.
     resolution : int, optional
         Number of nodes along the longest side of that default grid; 128 by default. The solid should be at least
         two cells thick.
@@ -552,7 +562,7 @@ def thicken(
     Returns
     -------
     TriangleMesh
-        Closed and manifold, normals pointing out of the solid.
+        The boundary of the solid, closed and manifold, with normals that point out of it.
 
     Raises
     ------
@@ -592,25 +602,29 @@ def thicken(
 
 
 def _chosen(sheet: object, faces: ArrayLike) -> TriangleMesh | PolygonMesh:
-    """Return the mesh of the faces with some numbers, or of those for which a boolean array is True."""
+    """Return the mesh of some faces of a sheet, given by (k,) ids or by a boolean for each face."""
     sheet = converted(sheet)
     if not isinstance(sheet, TriangleMesh | PolygonMesh):
         raise SourceError("faces can be chosen for a single mesh only", element="faces", remedy="pass it alone")
     n = sheet.n_faces if isinstance(sheet, TriangleMesh) else sheet.n_polygons
-    named = array_of(faces, "faces", SourceError)
-    chosen = np.flatnonzero(named) if named.dtype == bool and named.shape == (n,) else named.ravel()
-    if not len(chosen) or chosen.dtype.kind not in "iu" or chosen.min() < 0 or chosen.max() >= n:
+    given = array_of(faces, "faces", SourceError)
+    ids = np.flatnonzero(given) if given.dtype == bool and given.shape == (n,) else given.ravel()
+    if not len(ids) or ids.dtype.kind not in "iu" or ids.min() < 0 or ids.max() >= n:
         raise SourceError(
             f"faces must be face numbers from 0 to {n - 1}, or one boolean for each face", element="faces"
         )
     if isinstance(sheet, TriangleMesh):
-        return TriangleMesh(sheet.vertices, sheet.faces[chosen])
+        return TriangleMesh(sheet.vertices, sheet.faces[ids])
     polygons = list(sheet.polygons)
-    return PolygonMesh(sheet.vertices, [polygons[k] for k in chosen])
+    return PolygonMesh(sheet.vertices, [polygons[k] for k in ids])
 
 
 def _linear(shape: Shapes, values: Floats) -> Reach:
-    """Return a function that interpolates values at the vertices of a mesh, or at the nearest point of a cloud."""
+    """Return a function that interpolates distances given at vertices.
+
+    It takes (k, 3) points on a mesh with (n,) values at its vertices, and returns (k,) linearly interpolated values.
+    For a point cloud, it returns the value of the nearest point.
+    """
     mesh = shape.source if isinstance(shape, Solid) else as_shape(shape)  # type: ignore[arg-type]
     if not isinstance(mesh, TriangleMesh | PolygonMesh | DigitalSurface | PointCloud):
         raise UnsupportedTypeError(
@@ -627,21 +641,22 @@ def _linear(shape: Shapes, values: Floats) -> Reach:
         )
     if isinstance(mesh, PointCloud):
         tree = PointTree(points)
-        return lambda places: values[tree.query(places)[1]]
+        return lambda positions: values[tree.query(positions)[1]]
     if not isinstance(mesh, TriangleMesh):
         values, mesh = mesh.on_triangulation(values), mesh.triangulation
     vertices, corners = mesh.vertices, mesh.faces
     faces = FaceTree.of(FaceFeatures.of(vertices, corners))
 
-    def interpolated(places: Floats) -> Floats:
-        found = faces.search(places)
-        ids = corners[faces.features.ids[found.faces]]
-        return (weights_in(vertices[ids], found.places) * values[ids]).sum(axis=1)
+    def interpolated(positions: Floats) -> Floats:
+        nearest = faces.search(positions)
+        ids = corners[faces.features.ids[nearest.faces]]
+        return (weights_in(vertices[ids], nearest.places) * values[ids]).sum(axis=1)
 
     return interpolated
 
 
 def _warn_not_hollow(inner: float) -> None:
+    """Warn that no point of a shape is as deep as the inner side of a shell, at the signed distance `inner`."""
     warn_user(
         f"the shape is not hollowed: no point of it is {-inner:g} deep at the resolution of the grid. Use a wall "
         "thinner than half of the part",
@@ -662,8 +677,8 @@ def _without_crumbs(wall: TriangleMesh, thickness: float) -> TriangleMesh:
 def _with_drain_hole(wall: TriangleMesh, diameter: float, cell: float) -> TriangleMesh:
     """Return a wall with a round hole from the bottom of its largest cavity straight down to the outside.
 
-    The hole is a prism around the vertical axis z. It is added with faces inwards, which subtracts it.
-    It goes where the cavity is widest. Differences below a millionth of `cell`, the grid's, do not decide that.
+    The hole is a prism along −z of the given diameter. It is added with faces inwards, which subtracts it. It begins
+    where the bottom of the cavity is widest, up to differences of a millionth of a grid `cell`.
     """
     parts, volumes = part_volumes(wall.vertices, wall.faces)
     if not volumes.min() < 0:
@@ -694,7 +709,7 @@ def _offsets(
     resolution: int | None,
     measure: Measure,
 ) -> Boundary:
-    """Offset a shape once for each sign, outward for 1 and inward for −1; compute the distance again each time."""
+    """Offset a shape once for each of the signs, outward for 1 and inward for −1, computing the distance each time."""
     distance = finite_number(distance, "the distance", least=0)
     callback(measure, "measure(shape, domain)")
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
@@ -706,7 +721,7 @@ def _offsets(
 
 
 def _given_or_room(domain: Domain | None, shape: Sources, reach: float, resolution: int | None) -> Domain:
-    """Return the domain, or if it is None, a grid around the shape with room for offsets up to `reach`."""
+    """Return the domain or, if it is None, a grid around the shape with room for offsets up to `reach`."""
     if domain is not None:
         refuse_beside("a domain", resolution=resolution)
         return domain
@@ -719,6 +734,7 @@ def _given_or_room(domain: Domain | None, shape: Sources, reach: float, resoluti
 
 
 def _grid(domain: object) -> Grid[Literal[3]]:
+    """Return the domain if it is a grid in space, else raise an error."""
     if not isinstance(domain, Grid):
         raise UnsupportedTypeError(
             f"walls are made on a Grid, not on a {type(domain).__name__}", remedy="leave the domain out, or pass one"
@@ -732,6 +748,7 @@ def _grid(domain: object) -> Grid[Literal[3]]:
 
 
 def _refuse_thin(grid: Grid[Literal[3]], thickness: float) -> None:
+    """Raise an error if a wall is thinner than the largest side of a grid cell."""
     cell = float(grid.spacing.max())
     if thickness < cell:
         nodes = int(np.ceil(max(grid.shape) * 2 * cell / thickness))

@@ -24,7 +24,7 @@ REMEDIES = {
 
 
 class LazyModule:
-    """A module that is imported at its first use: see `lazy_module`."""
+    """A handle made by `lazy_module`, which imports a module when an attribute is first used."""
 
     def __init__(self, name: str, purpose: str) -> None:
         self._name = name
@@ -40,10 +40,10 @@ class LazyModule:
 
 
 def lazy_module(name: str, purpose: str) -> Any:
-    """Make a handle that acts as a module, and imports it at the first use of an attribute.
+    """Return a handle that acts as the module `name`, and imports it when an attribute is first used.
 
-    `purpose` is a plural noun that begins the error message if the import fails: "contours need the package skimage,
-    which is not installed".
+    `purpose` is a plural noun for the error message if the import fails, such as "contours" in "contours need the
+    package skimage, which is not installed".
 
     Examples
     --------
@@ -55,7 +55,7 @@ def lazy_module(name: str, purpose: str) -> Any:
 
 
 def require(name: str, purpose: str) -> ModuleType:
-    """Import a module now, for instance before a long computation that needs it at the end."""
+    """Import a module, and return it; raise `MissingPackageError` if that fails. `purpose` is as for `lazy_module`."""
     try:
         return import_module(name)
     except ImportError as error:
@@ -72,6 +72,6 @@ def ensure_installed(package: str, purpose: str) -> None:
 
 
 def missing_package(package: str, purpose: str, cause: str = "is not installed") -> MissingPackageError:
-    """Make the error for a missing package."""
+    """Return the error that says that a package is missing; `purpose` is as for `lazy_module`."""
     remedy = REMEDIES.get(package, f"pip install {package}")
     return MissingPackageError(f"{purpose} need the package {package}, which {cause}", remedy=remedy, element=package)

@@ -1,4 +1,4 @@
-"""Functions applied to rows of arrays on several threads, trees of points, and connections to Dask clusters."""
+"""Functions on rows of arrays on several threads, trees of points, and connections to Dask clusters."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ Result = TypeVar("Result")
 ROWS_PER_TASK = 1 << 13
 """Number of rows that a thread processes at a time."""
 BRIEF_ROWS = 1 << 8
-"""Number of rows up to which they are processed too soon for anybody to interrupt it."""
+"""Number of rows up to which `in_chunks` calls kernels directly, because nobody would interrupt so short a call."""
 CLUSTER_SECONDS = 30.0
-"""Seconds to wait for a cluster to answer."""
+"""Seconds to wait for a Dask scheduler to answer, before an error is raised."""
 
 
 def n_threads() -> int:
-    """Count the processors available to this process, at most ``NUMBA_NUM_THREADS``."""
+    """Return the number of processors available to this process, or ``NUMBA_NUM_THREADS`` if that is less."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
     wanted = os.environ.get("NUMBA_NUM_THREADS", "")
     return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
@@ -44,9 +44,10 @@ def n_threads() -> int:
 def in_chunks(
     function: Callable[[NDArray[Any]], tuple[NDArray[Any], ...]], rows: NDArray[Any]
 ) -> tuple[NDArray[Any], ...]:
-    """Apply a function to chunks of rows on all threads, and concatenate its results.
+    """Apply a function to chunks of rows on all threads, and concatenate the arrays that it returns.
 
-    The result does not depend on the number of threads. Each thread needs additional memory for one chunk.
+    The function takes some rows and returns a tuple of arrays with one row for each. The result does not depend on the
+    number of threads. Each thread needs additional memory for one chunk.
     """
     if len(rows) <= BRIEF_ROWS:
         with briefly():
@@ -67,9 +68,10 @@ def in_chunks(
 
 
 def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """Yield the results of a function in the order of its arguments, from all threads, and hold few at a time.
+    """Yield the results of a function for items, in their order, computed on all threads.
 
-    After Ctrl-C, threads end when their item or the next kernel does, and are not waited for.
+    Only a few results are held at a time. After Ctrl-C, threads end after their item or at the next kernel, and are not
+    waited for.
     """
     tasks: SimpleQueue[tuple[Future[Result], Callable[[], Result]] | None] = SimpleQueue()
 
@@ -107,9 +109,9 @@ def in_threads(function: Callable[[Item], Result], items: Iterable[Item]) -> Ite
 
 
 class PointTree:
-    """SciPy's tree of points, with queries on threads of ours: SciPy's own crash after Ctrl-C.
+    """SciPy's tree of points, with queries on threads of this package.
 
-    They use the tree after it has been freed.
+    SciPy's own threads crash after Ctrl-C, since they use the tree after it has been freed.
     """
 
     def __init__(self, points: Floats, **options: Any) -> None:
@@ -118,7 +120,7 @@ class PointTree:
         self.tree: Any = make(points, **options) if few else interruptible(make, points, **options)
 
     def __getattr__(self, name: str) -> Any:
-        """Return what else SciPy's tree has."""
+        """Return an attribute of SciPy's tree."""
         return getattr(self.tree, name)
 
     def sparse_distance_matrix(self, other: PointTree, reach: float, **options: Any) -> Any:
@@ -145,7 +147,7 @@ class PointTree:
 
 
 def connected(address: str) -> Any:
-    """Connect to a running Dask cluster, and return the client; raise if no scheduler answers within a minute."""
+    """Connect to the Dask scheduler at an address, and return the client; raise if none answers within a minute."""
     comm = distributed.comm  # raises if Dask is missing, before errors are converted
     try:
         if comm.parse_address(address)[0] == "tcp":
@@ -161,11 +163,14 @@ def connected(address: str) -> Any:
 
 
 def _hear_greeting(host: str, port: int) -> None:
-    """Refuse a listener that is not a scheduler: Dask would wait too long for it, or allocate too much memory."""
+    """Raise an error if a server does not greet as a Dask scheduler does.
+
+    Dask itself would wait too long for such a server, or allocate too much memory.
+    """
     with socket.create_connection((host, port), CLUSTER_SECONDS) as connection:
         try:
-            heard = connection.recv(8, socket.MSG_WAITALL)
+            greeting = connection.recv(8, socket.MSG_WAITALL)
         except TimeoutError:
-            heard = b""
-    if len(heard) < 8 or int.from_bytes(heard, "little") > 1 << 20:  # a scheduler's first message is not as long
+            greeting = b""
+    if len(greeting) < 8 or int.from_bytes(greeting, "little") > 1 << 20:  # a scheduler's first message is not as long
         raise ConnectionError("the listener there is not a scheduler")

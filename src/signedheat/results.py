@@ -1,4 +1,4 @@
-"""Classes of what functions and methods return, for annotations."""
+"""Classes of the objects that functions and methods return, for use in annotations."""
 
 from .curves.cut_surface import Cut, CutSurface
 from .curves.stroke_directions import CurveOrientation

@@ -1,6 +1,6 @@
-"""Sample shapes: a few closed ones, functions that damage them, and the broken duck of `signedheat demo`.
+"""Sample shapes, functions that damage them, and the broken duck of `signedheat demo`.
 
-All are generated; random ones from fixed seeds.
+All shapes are computed. Functions with a `seed` give the same result for the same seed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,21 @@ __all__ = [
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
-    """Make a sphere: an icosahedron whose faces are split into four `subdivisions` times.
+    """Make a sphere from an icosahedron, whose faces are split into four and moved to the sphere.
+
+    Parameters
+    ----------
+    subdivisions : int
+        How often faces are split, so that there are ``20 · 4**subdivisions`` faces.
+    radius : float
+        Radius of the sphere.
+    center : (3,) float
+        Center of the sphere.
+
+    Returns
+    -------
+    TriangleMesh
+        A closed mesh with outward normals, whose vertices lie on the sphere.
 
     Examples
     --------
@@ -60,6 +74,20 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
 def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: int = 48) -> TriangleMesh:
     """Make a torus around the z axis.
 
+    Parameters
+    ----------
+    major : float
+        Radius of the circle in the plane z = 0 around which the tube runs.
+    minor : float
+        Radius of the tube.
+    n_around, n_across : int
+        Number of vertices around the z axis, and around the tube.
+
+    Returns
+    -------
+    TriangleMesh
+        A closed mesh with outward normals.
+
     Examples
     --------
     >>> torus(n_around=6, n_across=4)
@@ -77,12 +105,17 @@ def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: 
 
 
 def duck(n: int = 56) -> TriangleMesh:
-    """Make a rubber duck of length 2, closed, whose beak is a separate body that intersects the head.
+    """Make a rubber duck about 2 long, whose beak is a separate body that intersects the head.
 
     Parameters
     ----------
     n : int
-        Number of cells along the duck's length of the grid on which the body is contoured.
+        Number of grid cells along the duck with which its body is computed.
+
+    Returns
+    -------
+    TriangleMesh
+        Two closed bodies with outward normals.
     """
     lower, upper = np.array([-1.15, -0.8, -0.75]), np.array([1.0, 0.8, 1.15])
     spacing = 2.15 / n
@@ -105,19 +138,53 @@ def duck(n: int = 56) -> TriangleMesh:
 
 
 def broken_duck() -> TriangleMesh:
-    """Make a duck with holes, noise, flipped and duplicate faces; the end of its beak is inside the head."""
+    """Make a damaged `duck`, with holes, noise, flipped faces and duplicate faces.
+
+    Returns
+    -------
+    TriangleMesh
+        The mesh, which is the same in every call.
+    """
     mesh = without_patches(duck(), n_patches=7, radius=0.26, seed=3)
     mesh = with_noise(mesh, 0.006, seed=1)
     return with_duplicate_faces(with_flipped_faces(mesh, 0.05, seed=2), 0.02, seed=5)
 
 
 def union(*meshes: TriangleMesh) -> TriangleMesh:
-    """Join all faces of several meshes in one mesh, without merging vertices."""
+    """Put all faces of several meshes into one mesh, without merging vertices or cutting faces.
+
+    Parameters
+    ----------
+    *meshes : TriangleMesh
+        The meshes.
+
+    Returns
+    -------
+    TriangleMesh
+        Vertices and faces of the meshes, in order.
+    """
     return TriangleMesh(*joined_triangles(meshes))
 
 
 def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int = 0) -> TriangleMesh:
-    """Remove the faces within `radius` of `n_patches` vertices, which are chosen far from each other."""
+    """Cut holes into a mesh, by removing the faces near some vertices that are far from each other.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    n_patches : int
+        Number of these vertices.
+    radius : float
+        Distance from the vertices, in the units of the mesh, within which the centroids of removed faces lie.
+    seed : int
+        Seed of the random generator, which chooses the first vertex.
+
+    Returns
+    -------
+    TriangleMesh
+        All vertices, and the remaining faces.
+    """
     picked = [int(np.random.default_rng(seed).integers(mesh.n_vertices))]
     nearest = np.linalg.norm(mesh.vertices - mesh.vertices[picked[0]], axis=1)
     while len(picked) < n_patches:
@@ -129,33 +196,104 @@ def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int
 
 
 def without_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """Remove a random fraction of the faces."""
+    """Remove random faces of a mesh.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    fraction : float
+        Probability of each face to be removed, from 0 to 1.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    TriangleMesh
+        All vertices, and the remaining faces.
+    """
     return TriangleMesh(mesh.vertices, mesh.faces[np.random.default_rng(seed).random(mesh.n_faces) >= fraction])
 
 
 def with_noise(mesh: TriangleMesh, amplitude: float, seed: int = 0) -> TriangleMesh:
-    """Move vertices at random; `amplitude` is the standard deviation along each axis."""
+    """Move the vertices of a mesh at random.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    amplitude : float
+        Standard deviation of the moves along each axis, in the units of the mesh.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    TriangleMesh
+        The same faces, with moved vertices.
+    """
     moves = np.random.default_rng(seed).normal(scale=amplitude, size=mesh.vertices.shape)
     return TriangleMesh(mesh.vertices + moves, mesh.faces)
 
 
 def with_flipped_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """Reverse the orientation of a random fraction of the faces."""
+    """Reverse the orientation of random faces of a mesh.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    fraction : float
+        Probability of each face to be flipped, from 0 to 1.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    TriangleMesh
+        The same vertices and faces, some of which have their corners in reverse order.
+    """
     flipped = np.random.default_rng(seed).random(mesh.n_faces) < fraction
     return TriangleMesh(mesh.vertices, np.where(flipped[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
 def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> TriangleMesh:
-    """Duplicate a random fraction of the faces."""
+    """Append copies of random faces to a mesh.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    fraction : float
+        Probability of each face to be copied, from 0 to 1.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    TriangleMesh
+        All faces, followed by the copies, which have the same vertices.
+    """
     doubled = np.random.default_rng(seed).random(mesh.n_faces) < fraction
     return TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[doubled]]))
 
 
 def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh:
-    """Make a triangle soup: the same triangles, but none shares a vertex with another.
+    """Make a triangle soup of a mesh, in which no triangle shares a vertex with another, and move triangles at random.
 
-    Each triangle is moved at random as a whole; `jitter` is the standard deviation of each of its coordinates, in
-    the units of the mesh.
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    jitter : float
+        Standard deviation of the random move of each triangle along each axis, in the units of the mesh.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    TriangleMesh
+        The same triangles, in order, with three vertices for each.
     """
     corners = mesh.vertices[mesh.faces]
     corners = corners + np.random.default_rng(seed).normal(scale=jitter, size=(mesh.n_faces, 1, 3))
@@ -163,7 +301,22 @@ def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh
 
 
 def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCloud:
-    """Draw random points on the surface, uniform in area, with the normals of their faces."""
+    """Draw random points on a mesh, uniformly by area, with the normals of their faces.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The mesh.
+    n_points : int
+        Number of points.
+    seed : int
+        Seed of the random generator.
+
+    Returns
+    -------
+    PointCloud
+        The points, with normals.
+    """
     rng = np.random.default_rng(seed)
     face = rng.choice(mesh.n_faces, size=n_points, p=mesh.face_areas / mesh.face_areas.sum())
     root, share = np.sqrt(rng.random(n_points)), rng.random(n_points)

@@ -31,13 +31,14 @@ from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
 from .validation import callback, positive_number, public_call, refuse_pair_apart
 
-SOURCES_AT_ONCE = 16  # sources diffused at a time
+SOURCES_AT_ONCE = 16
+"""Number of sources that `distance_many` diffuses at a time, which bounds its memory."""
 
 AnyDomain = TypeVar("AnyDomain", bound=Domain | ForeignShape, covariant=True)
 
 
 class _Prepared(NamedTuple):
-    """Sources of one field, ready to be diffused."""
+    """Sources of one field, lowered to a discretisation, so that the three steps can run."""
 
     discretization: Discretization
     terms: Sequence[SourceTerm]  # one for each diffusion time
@@ -46,32 +47,36 @@ class _Prepared(NamedTuple):
 
     @property
     def times(self) -> list[float]:
-        """Diffusion times."""
+        """Diffusion time t of each of the terms."""
         return [term.time for term in self.terms]
 
 
 @dataclass(frozen=True, eq=False)
 class SignedHeatSolver(Frozen, Generic[AnyDomain]):
-    """Generalized signed distance on one domain.
+    """Solver for generalized signed distance on one domain, by the signed heat method.
 
     Matrices are factorised at first use and kept, so that further distances are cheap.
 
     Parameters
     ----------
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Grid
-        Where distance is measured. Boundary vertices of a mesh that coincide, as along seams, are treated as one.
+        Domain of the fields. Boundary vertices of a mesh that coincide, as along seams, are treated as one vertex.
     diffusion : float or Extrapolated, optional
-        τ in ``t = τ h²``, the time for which normals of the source are diffused like heat, with h the mean distance
-        between unknowns; the paper's is 1. Larger values close gaps in broken
-        sources along rounder lines. By default 1 in space and, on surfaces, `Extrapolated`.
+        Factor τ of the time ``t = τ h²`` for which normals of the source are diffused like heat, with h the mean
+        distance between unknowns. Larger values close gaps in broken sources along rounder lines. The paper uses 1. The
+        default is 1 in space and `Extrapolated` on surfaces.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+        Called as ``progress(fraction, step)``. An exception that it raises cancels.
     intrinsic : "auto", True or False
-        Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh. "auto": where large angles or
-        needles would make distance inaccurate, the mesh is refined once, and all sources share it and its factors.
-        True: every set of sources gets its own refinement, with edges along the sources, for curves smaller than
-        triangles. On CAD models its error is 0.3 to 0.9 times that of "auto", at the cost of a factorisation for every
-        set. False: the triangles as they are. For more control, pass the result of `intrinsic_delaunay` as the domain.
+        Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh instead of its triangles.
+
+        * "auto" refines the mesh once, if large angles or thin triangles would make distance inaccurate. All sources
+          share the refinement and its factorised matrices.
+        * True makes a refinement for every set of sources, with edges along them, for curves smaller than triangles.
+          On CAD models its error is 0.3 to 0.9 times that of "auto", at the cost of a factorisation for every set.
+        * False uses the triangles as they are.
+
+        For more control, pass the result of `intrinsic_delaunay` as the domain.
 
     Raises
     ------
@@ -116,28 +121,33 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 
     @property
     def discretization(self) -> Adaptable:
-        """The discretisation of the domain."""
+        """The discretisation of the domain, which is made at first use."""
         return self._made(None, self._discretized)
 
     def _discretized(self) -> Adaptable:
-        """Return the discretization of the domain: on it, on a refinement of it, or on one for each set of sources."""
+        """Make the discretisation, of the domain, of a refinement, or of a new refinement for every set of sources.
+
+        The option `intrinsic` decides which.
+        """
         report = within(self.progress, 0.2, 0.4)
         if self.intrinsic == "auto":
             return lowered_by_angles(self.domain, report)
         return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
 
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
-        """Make a solver with another τ, which shares what does not depend on τ, such as the factorised Laplacian.
+        """Return a solver on the same domain with another diffusion factor τ.
+
+        It shares everything that does not depend on τ with this solver, such as the factorised Laplacian.
 
         Parameters
         ----------
         diffusion : float, Extrapolated or None
-            As for the class.
+            Factor τ of the diffusion time ``t = τ h²``, as for the class.
 
         Returns
         -------
         SignedHeatSolver
-            On the same domain.
+            The new solver. This one does not change.
 
         See Also
         --------
@@ -173,16 +183,16 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Parameters
         ----------
         sources : one source or a sequence of them
-            On surfaces: `Curve`, `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In
-            space: `TriangleMesh`, `PolygonMesh`, `PointCloud`. In the plane: `Polyline`.
+            On surfaces `Curve`, `SurfacePoints`, or lists of (element, barycentric coordinates), as in potpourri3d. In
+            space `TriangleMesh`, `PolygonMesh` or `PointCloud`. In the plane `Polyline`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Values that φ is to have at the sources, see `constraints`. By default `ZeroSet`, zero on all of them.
+            Constraint on φ at the sources (`constraints`). By default `ZeroSet`, which makes φ zero on all of them.
 
         Returns
         -------
         Field
-            φ on the domain, in its units: positive on the side that the source normals point to, so negative inside,
-            and on a surface positive to the left of a curve.
+            Signed distance φ in the units of the domain. It is positive on the side that the source normals point to,
+            so negative inside a shape. On a surface it is positive to the left of a curve.
 
         Raises
         ------
@@ -209,11 +219,12 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 
     @cached_property
     def _repaired(self) -> tuple[RepairedMesh, SignedHeatSolver[Any]] | None:
-        """The domain without copies of faces, and the solver on it; None if there are no copies."""
+        """The mesh without duplicate faces, and a solver on it; None if the domain has no duplicate faces."""
         repaired = RepairedMesh.of(self.domain, agree=False)
         return None if repaired is None else (repaired, replace(self, domain=repaired.mesh))
 
     def _distance(self, sources: Sources, constraint: Constraint | None) -> Field:
+        """Compute the field of `distance` without warning of small curves."""
         if self._repaired is not None:
             repaired, solver = self._repaired
             return repaired.on_given(cast("Field[Any]", solver._distance(repaired.on_it(sources), constraint)))
@@ -227,7 +238,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             vectors = [diffuse(discretization, source) for source in sources_by_time]
         with stopwatch("normalize"):
             source = sources_by_time[0]
-            directions = blended(sources_by_time, (normalize(discretization, each) for each in vectors))
+            directions = blended(sources_by_time, (normalize(discretization, diffused) for diffused in vectors))
             del vectors
         with stopwatch("integrate"):
             values = integrate(discretization, directions, source, constraint)
@@ -235,9 +246,9 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         return to_field(discretization, values, source, diagnostics)
 
     def _prepared(self, sources: Sources, constraint: Constraint) -> _Prepared:
-        """Return the discretization adapted to sources, these on it for each diffusion time, notes and the constraint.
+        """Adapt the discretisation to sources, and lower them to it for each diffusion time.
 
-        Curves that have one side only are warned of.
+        Warns of curves that have one side only. Levels of sources that are left out are dropped from the constraint.
         """
         listed, left_out = given_curves(self.domain, as_list(sources))
         kept = numbers_kept(len(listed), left_out)
@@ -267,20 +278,20 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]: ...
     @public_call
     def distance_many(self, sources: Sequence[Sources], constraint: Constraint | None = None) -> Sequence[Field]:
-        """Compute the signed distance to each of several sources, faster than by one call of `distance` for each.
+        """Compute a field for each of several sources, which is faster than to call `distance` for each.
 
         Parameters
         ----------
         sources : sequence
-            Each entry is an argument of `distance`.
+            Entries that `distance` accepts as its `sources`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Constraint on each φ; `ZeroSet` by default. With `Free`, the sources share most of the work.
+            Constraint on every field; `ZeroSet` by default. With `Free`, the sources share most of the work.
 
         Returns
         -------
         list of Field
-            The result of `distance` for each, up to rounding, in the units of the domain and with the same signs.
-            Timings are divided equally among the sources.
+            The result of `distance` for each entry, up to rounding, in the units of the domain. Timings are divided
+            equally among the sources.
 
         Raises
         ------
@@ -315,24 +326,24 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
         fields: list[Field] = []
         for begin in range(0, len(listed), SOURCES_AT_ONCE):
-            batch = (self._prepared(each, constraint) for each in listed[begin : begin + SOURCES_AT_ONCE])
+            batch = (self._prepared(entry, constraint) for entry in listed[begin : begin + SOURCES_AT_ONCE])
             for (discretization, _, imposed), run in groupby(
-                batch, lambda each: (each.discretization, each.times, each.constraint)
+                batch, lambda prepared: (prepared.discretization, prepared.times, prepared.constraint)
             ):
                 alike = list(run)
-                by_time = list(zip(*(each.terms for each in alike), strict=True))
+                by_time = list(zip(*(prepared.terms for prepared in alike), strict=True))
                 first = by_time[0]
                 stopwatch = Stopwatch(None, steps=1)
                 with stopwatch("together"):
-                    diffused = [diffuse_many(discretization, each) for each in by_time]
+                    diffused = [diffuse_many(discretization, terms) for terms in by_time]
                     directions = (
-                        blended(each.terms, [normalize(discretization, vectors) for vectors in of_times])
-                        for each, of_times in zip(alike, zip(*diffused, strict=True), strict=True)
+                        blended(prepared.terms, [normalize(discretization, vectors) for vectors in of_times])
+                        for prepared, of_times in zip(alike, zip(*diffused, strict=True), strict=True)
                     )
                     solved = list(integrate_many(discretization, directions, first, imposed))
                 seconds = {step: total / len(first) for step, total in stopwatch.seconds.items()}
-                for source, values, each in zip(first, solved, alike, strict=True):
-                    diagnostics = Diagnostics(timings=seconds, time=source.time, notes=each.notes)
+                for source, values, prepared in zip(first, solved, alike, strict=True):
+                    diagnostics = Diagnostics(timings=seconds, time=source.time, notes=prepared.notes)
                     fields.append(warned(to_field(discretization, values, source, diagnostics)))
             if report is not None:
                 report(len(fields) / len(listed), f"{len(fields)} of {len(listed)}")
@@ -351,10 +362,10 @@ def distance_unwarned(solver: SignedHeatSolver[Any], sources: Sources, constrain
 
 
 def with_discretization(solver: SignedHeatSolver[AnyDomain], made: Adaptable) -> SignedHeatSolver[AnyDomain]:
-    """Return a solver as this one that uses a discretisation made before."""
-    other = replace(solver)
-    other._made(None, lambda: made)
-    return other
+    """Return a copy of a solver that uses a discretisation made before."""
+    copy = replace(solver)
+    copy._made(None, lambda: made)
+    return copy
 
 
 def field_without_heat(
@@ -362,7 +373,11 @@ def field_without_heat(
     curves: CurvesAndPoints,
     measure: Callable[[SurfaceSource], tuple[Floats, tuple[Note, ...]] | None],
 ) -> Field[AnySurface] | None:
-    """Make a field of values at all vertices of the triangles that curves are lowered to; None if there are none."""
+    """Make a field from values that ``measure(source)`` returns, without diffusion.
+
+    The source has the curves lowered to the triangles of the solver. The function returns (n,) values at their vertices
+    and notes for the diagnostics, or None. Then the result is None, too.
+    """
     stopwatch = Stopwatch(None, steps=1)
     with stopwatch("distance"):
         discretization, terms, notes, _ = solver._prepared(curves, ZeroSet())
@@ -375,6 +390,7 @@ def field_without_heat(
 
 
 def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any], names: Ints) -> None:
+    """Warn of curves on a mesh along which left and right are exchanged, as on a Möbius strip; `names` number them."""
     numbers = one_sided(curves, domain.intrinsic) if isinstance(domain, TriangleMesh) else []
     if numbers:
         warn_user(
@@ -386,7 +402,7 @@ def _warn_of_one_sided_curves(domain: object, curves: Sequence[Any], names: Ints
 
 
 def checked(constraint: Constraint | None) -> Constraint:
-    """Return the constraint, or the default for None; refuse anything else."""
+    """Return the constraint, or ``ZeroSet()`` for None; raise an error for anything else."""
     if constraint is None:
         return ZeroSet()
     if isinstance(constraint, type) or not isinstance(constraint, Constraint):

@@ -1,4 +1,4 @@
-"""Distances that PyTorch can differentiate with respect to the points and to the vertices of the mesh.
+"""Signed distances that PyTorch can differentiate with respect to the points and to the vertices of the mesh.
 
 ``sh.torch.distance(solid, points, vertices)`` is `Solid.distance` of tensors. PyTorch is imported at the first call.
 """
@@ -22,34 +22,33 @@ torch: Any = lazy_module("torch", "tensors")
 
 
 def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Tensor:
-    """Compute signed distances of points, negative inside, that PyTorch can differentiate.
+    """Compute signed distances of points to a solid, negative inside, that PyTorch can differentiate.
 
-    Let q be the point of the surface nearest to a point p at distance d, with weights w in a face with corners v. Then
-    d changes by ``∇d · (δp − Σ w δv)``, since q moves along the surface only. If q lies on the completion, d does not
-    depend on the vertices, since the completion is held fixed. Only first derivatives are computed; second ones are
-    zero.
+    Let d be the distance of a point p, and q the nearest point of the surface, with barycentric weights w in a face
+    with corners v. If p and v change by δp and δv, then d changes by ``∇d · (δp − Σ w δv)``. If q lies on the
+    completion, which is held fixed, d does not depend on the vertices. Second derivatives are not computed, but zero.
 
     Parameters
     ----------
     solid : Solid
-        What `complete` has made of a mesh. Complete it again when an optimiser has moved the vertices.
+        A solid that `complete` made of a mesh. Complete the mesh again after an optimiser has moved its vertices.
     points : (..., 3) tensor
-        Positions in the units of the solid, in batches of any shape, on any device.
+        Positions in the units of the solid, on any device.
     vertices : (k, 3) tensor, optional
         Vertices of the mesh that was completed, if derivatives with respect to them are wanted.
 
     Returns
     -------
     (...) tensor
-        Distances in the units of the solid, with the shape and device of the points, and their type if it is a
-        floating-point type; computed on the CPU in double precision.
+        Signed distances in the units of the solid, on the device of the points, and in their type if that is a
+        floating-point type. They are computed on the CPU in double precision.
 
     Raises
     ------
     SourceError
         If the solid was not completed from a triangle mesh with these vertices.
     UnsupportedTypeError
-        If it is no solid.
+        If `solid` is no `Solid`.
     MissingPackageError
         If PyTorch is not installed.
 
@@ -79,8 +78,8 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     points = torch.as_tensor(points)
     points = points if points.is_floating_point() else points.to(torch.get_default_dtype())
     rows, shape = points.reshape(-1, points.shape[-1] if points.ndim else 1), points.shape[:-1]
-    found = solid.closest(rows.detach().cpu().double().numpy())
-    nearest = torch.from_numpy(found.points)
+    closest = solid.closest(rows.detach().cpu().double().numpy())
+    nearest = torch.from_numpy(closest.points)
     if vertices is not None:
         if solid.source is None:
             raise SourceError(
@@ -95,14 +94,14 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
                 remedy="complete the mesh again after each step",
                 element="vertices",
             )
-        given = np.flatnonzero(found.faces >= 0)
-        corners = torch.from_numpy(solid.source.faces[found.faces[given]].astype(np.int64))
-        weights = torch.from_numpy(found.barycentric[given])
+        given = np.flatnonzero(closest.faces >= 0)
+        corners = torch.from_numpy(solid.source.faces[closest.faces[given]].astype(np.int64))
+        weights = torch.from_numpy(closest.barycentric[given])
         moves = vertices.cpu().double()
         moves = moves - moves.detach()
         nearest = nearest.index_add(0, torch.from_numpy(given), (weights[..., None] * moves[corners]).sum(dim=1))
     exact = rows.cpu().double()
-    slopes = torch.from_numpy(found.gradients)
+    slopes = torch.from_numpy(closest.gradients)
     moved = (exact - exact.detach()) - (nearest - nearest.detach())
-    values = torch.from_numpy(found.distances) + (moved * slopes).sum(dim=1)
+    values = torch.from_numpy(closest.distances) + (moved * slopes).sum(dim=1)
     return values.reshape(shape).to(device=points.device, dtype=points.dtype)

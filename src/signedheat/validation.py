@@ -1,4 +1,7 @@
-"""Checks of arguments: those that every public call makes, and those of arrays and numbers, returned read-only."""
+"""Checks of arguments of public functions, and their conversion to arrays and numbers.
+
+A function here returns the converted value, or raises an error in which `name` names the argument.
+"""
 
 from __future__ import annotations
 
@@ -21,14 +24,18 @@ from .memory import within_memory
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 LARGEST_COORDINATE = 1e40
-"""Largest coordinate. Squared volumes, the largest powers of lengths that are computed, then stay finite."""
+"""Largest absolute value of a coordinate that is accepted. Squared volumes, the largest powers of lengths that are
+computed, then stay finite."""
 SMALLEST_EXTENT = 1e-40
-"""Smallest extent of a shape."""
+"""Smallest extent that is accepted, except 0. Powers of smaller lengths would vanish."""
 INT64_END = 2**63
 
 
 def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    """Make the array contiguous and read-only, so that quantities derived from it stay valid."""
+    """Return the array contiguous and read-only, so that quantities derived from it stay valid.
+
+    An array that is contiguous already is made read-only itself.
+    """
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array
@@ -36,7 +43,7 @@ def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
 
 @within_memory
 def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Floats:
-    """Return `values` as a new float64 array of any shape; refuse anything but real numbers."""
+    """Return `values` as a new float64 array of any shape; raise an error unless they are real numbers."""
     array = array_of(values, name, error)
     try:
         if array.dtype.kind not in "biufO":
@@ -60,7 +67,7 @@ def contiguous(values: object, name: str) -> Floats:
 
 @within_memory
 def whole_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Ints:
-    """Return `values` as a new int64 array of any shape; refuse anything but integers."""
+    """Return `values` as a new int64 array of any shape; raise an error unless they are integers."""
     array = array_of(values, name, error)
     if array.dtype.kind == "O" and array.size and all(isinstance(value, Integral) for value in array.ravel()):
         array = array.astype(np.int64) if all(abs(int(value)) < INT64_END for value in array.ravel()) else array
@@ -70,7 +77,10 @@ def whole_numbers(values: object, name: str, error: type[SignedHeatError] = Geom
 
 
 def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[Any]:
-    """Return `values` as an array: rows of numbers, or an array of a library that NumPy can read or with DLPack."""
+    """Return `values` as a NumPy array of any type, not copied if possible; raise an error if rows differ in length.
+
+    `values` may be nested sequences, or an array of a library that NumPy can convert or that supports DLPack.
+    """
     if np.ma.isMaskedArray(values):
         raise error(f"{name} are a masked array", remedy="drop what is masked, or fill it in", element=name)
     try:
@@ -81,13 +91,14 @@ def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryE
 
 
 def _described(array: NDArray[Any]) -> str:
+    """Return a text for error messages: the value of a 0-d array, and the type of others."""
     return f"an array of {array.dtype}" if array.ndim else " ".join(f"{array[()]!r:.50}".split())
 
 
 def finite_rows(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
 ) -> Floats:
-    """Return `values` as a read-only float64 array of shape (n, columns); refuse NaN and infinity."""
+    """Return `values` as a read-only float64 array of shape (n, columns); raise an error for NaN and infinity."""
     array = numbers(values, name, error)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
@@ -106,7 +117,7 @@ def finite_rows(
 def coordinates(
     values: object, name: str, columns: int | None = None, error: type[SignedHeatError] = GeometryError
 ) -> Floats:
-    """Like `finite_rows`, but refuse coordinates so large or close that powers of lengths overflow or vanish."""
+    """Return `finite_rows`, but raise an error if `refuse_extreme` does for the box around the rows."""
     array = finite_rows(values, name, columns, error)
     if len(array):
         refuse_extreme(array.min(axis=0), array.max(axis=0), name, error)
@@ -114,20 +125,27 @@ def coordinates(
 
 
 def refuse_extreme(lower: Floats, upper: Floats, name: str, error: type[SignedHeatError] = GeometryError) -> None:
-    """Refuse a box that reaches beyond `LARGEST_COORDINATE`, or is smaller than `SMALLEST_EXTENT` but not a point."""
+    """Raise an error for a box beyond `LARGEST_COORDINATE`, or smaller than `SMALLEST_EXTENT` but not a point.
+
+    `lower` and `upper` are its corners, (d,).
+    """
     with np.errstate(over="ignore"):  # the extent overflows if the box spans most of the range of floats
         farthest, extent = float(max(-lower.min(), upper.max())), float((upper - lower).max())
     if farthest > LARGEST_COORDINATE or 0 < extent < SMALLEST_EXTENT:
-        what = f"reach as far as {farthest:.3g}" if farthest > LARGEST_COORDINATE else f"extend over {extent:.3g} only"
+        fault = f"reach as far as {farthest:.3g}" if farthest > LARGEST_COORDINATE else f"extend over {extent:.3g} only"
         raise error(
-            f"{name} {what}, and lengths from {SMALLEST_EXTENT:g} to {LARGEST_COORDINATE:g} can be computed with",
+            f"{name} {fault}, and lengths from {SMALLEST_EXTENT:g} to {LARGEST_COORDINATE:g} can be computed with",
             remedy="scale and move the shape, for instance to a size of 1 around the origin",
             element=name,
         )
 
 
 def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]:
-    """Return `values` of shape (..., columns) as (n, columns), and the leading shape; refuse extreme coordinates."""
+    """Return points of shape (..., columns) as rows, (n, columns), and the leading shape.
+
+    Raises an error for coordinates that are not finite or exceed `LARGEST_COORDINATE`. `shaped` gives results the
+    leading shape.
+    """
     points = contiguous(values, "points")
     if points.shape[-1:] != (columns,):
         raise GeometryError(
@@ -148,12 +166,15 @@ def query_points(values: object, columns: int) -> tuple[Floats, tuple[int, ...]]
 
 
 def shaped(values: NDArray[Scalar], shape: tuple[int, ...]) -> NDArray[Scalar]:
-    """Return (n, ...) values in the leading shape of their n points, which is () for a single point."""
+    """Reshape the first axis of (n, ...) values to the leading shape of their n points; a number for shape ()."""
     return values.reshape((*shape, *values.shape[1:]))[()]
 
 
 def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
-    """Refuse a lattice from `first` to `last` whose spacing is lost in the rounding of coordinates."""
+    """Raise an error if the spacing of a lattice from `first` to `last` is lost in the rounding of coordinates.
+
+    The corners and the spacing, `steps`, are (d,).
+    """
     if (steps < 1e-13 * np.maximum(np.abs(first), np.abs(last))).any():
         raise GeometryError(
             f"the spacing {steps.tolist()} is lost in the rounding of coordinates from {first.tolist()} on",
@@ -165,7 +186,7 @@ def refuse_lost_spacing(steps: Floats, first: Floats, last: Floats) -> None:
 def finite_number(
     value: object, name: str, least: float = -np.inf, error: type[SignedHeatError] = SignedHeatError
 ) -> float:
-    """Return `value` as a finite float; refuse anything else, and numbers below `least`."""
+    """Return `value` as a finite float; raise an error for anything else, and for numbers below `least`."""
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool) or not isinstance(value, Real):
@@ -182,7 +203,7 @@ def finite_number(
 
 
 def positive_number(value: object, name: str, error: type[SignedHeatError] = SignedHeatError) -> float:
-    """Return `value` as a finite positive float; refuse anything else."""
+    """Return `value` as a finite positive float; raise an error for anything else."""
     number = finite_number(value, name, error=error)
     if number <= 0:
         raise error(f"{name} must be positive and finite, not {number:g}", element=name)
@@ -190,7 +211,7 @@ def positive_number(value: object, name: str, error: type[SignedHeatError] = Sig
 
 
 def whole_number(value: object, name: str, least: int, error: type[SignedHeatError] = GeometryError) -> int:
-    """Return `value` as an integer; refuse anything else, and numbers below `least`."""
+    """Return `value` as an integer; raise an error for anything else, and for numbers below `least`."""
     number = finite_number(value, name, error=error)
     if number % 1 or number < least:
         raise error(f"{name} must be a whole number of at least {least}, not {number:g}", element=name)
@@ -198,7 +219,7 @@ def whole_number(value: object, name: str, least: int, error: type[SignedHeatErr
 
 
 def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Bools:
-    """Return `values` as a boolean array of any shape, not copied; refuse other types than booleans."""
+    """Return `values` as a boolean array of any shape, not copied; raise an error for other types."""
     array = array_of(values, name, error)
     if array.dtype != np.bool_:
         raise error(
@@ -208,14 +229,14 @@ def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryEr
 
 
 def flag(value: object, name: str) -> bool:
-    """Return `value` as a bool; refuse anything but True and False."""
+    """Return `value` as a bool; raise an error for anything but True and False."""
     if not isinstance(value, bool | np.bool_):
         raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
     return bool(value)
 
 
 def callback(function: object, call: str) -> None:
-    """Refuse what cannot be called as `call` says, and is not None."""
+    """Raise an error unless `function` is None or can be called as in the text `call`, "progress(fraction, step)"."""
     if function is None:
         return
     name, _, rest = call.partition("(")
@@ -230,13 +251,13 @@ def callback(function: object, call: str) -> None:
 
 
 def instance(value: object, kind: type, name: str) -> None:
-    """Refuse what is no object of a class, and not None."""
+    """Raise an error unless `value` is None or an object of the class `kind`."""
     if value is not None and not isinstance(value, kind):
         raise UnsupportedTypeError(f"{name} is a {type(value).__name__}, not a {kind.__name__}", element=name)
 
 
 def chosen(value: object, choices: object, name: str) -> None:
-    """Refuse a value that is not one of the words of the ``Literal`` `choices`."""
+    """Raise an error unless `value` is one of the texts of the ``Literal`` type `choices`."""
     allowed = get_args(choices)
     if not isinstance(value, str) or value not in allowed:
         listed = " or ".join(f'"{choice}"' for choice in allowed)
@@ -244,7 +265,7 @@ def chosen(value: object, choices: object, name: str) -> None:
 
 
 def refuse_beside(given: str, **options: object) -> None:
-    """Refuse options that are not None, which have no effect beside what is given."""
+    """Raise an error for options that are not None, since they have no effect beside the argument named by `given`."""
     for name, value in options.items():
         if value is not None:
             raise UnsupportedTypeError(
@@ -253,7 +274,7 @@ def refuse_beside(given: str, **options: object) -> None:
 
 
 def percentages(values: object) -> Floats:
-    """Return `values` as an array of numbers from 0 to 100; refuse others."""
+    """Return `values` as an array of numbers from 0 to 100; raise an error for others."""
     percents = numbers(values, "percents", SignedHeatError)
     if not ((percents >= 0) & (percents <= 100)).all():
         raise SignedHeatError("percents must be from 0 to 100", element="percents")
@@ -261,7 +282,7 @@ def percentages(values: object) -> Floats:
 
 
 def positive_steps(values: object, count: int) -> Floats:
-    """Return a spacing, one positive number for all axes or one for each, as a (count,) array."""
+    """Return a spacing, given as one positive number or as one for each axis, as a read-only (count,) array."""
     steps = numbers(values, "spacing")
     if steps.shape not in ((), (count,)) or not (np.isfinite(steps).all() and (steps > 0).all()):
         raise GeometryError(
@@ -272,7 +293,10 @@ def positive_steps(values: object, count: int) -> Floats:
 
 
 def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Ints:
-    """Return `values` as a read-only int64 array of shape (m, corners); refuse ids outside 0 … n_vertices − 1."""
+    """Return ids of vertices as a read-only int64 array of shape (m, corners), m ≥ 1.
+
+    Raises an error for other shapes, and for ids outside 0 … n_vertices − 1.
+    """
     array = array_of(values, name, GeometryError)
     if array.size == 0:
         raise GeometryError(f"there are no {name}: the shape is empty", element=name)
@@ -302,17 +326,17 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
 
 
 def _whole(array: NDArray[Any]) -> bool:
-    """Whether an array has whole numbers only, of any type."""
+    """Whether an array has a floating-point type, but whole numbers only."""
     return array.dtype.kind == "f" and bool((array == np.round(array)).all())
 
 
 def from_zero(ids: Ints, n_vertices: int, name: str) -> str | None:
-    """Say how to count vertices from 0, if the ids look as if they were counted from 1."""
+    """Return a remedy for ids of vertices that are counted from 1, or None if these do not seem to be."""
     return f"they are counted from 1, so pass {name} - 1" if ids.min() == 1 and ids.max() == n_vertices else None
 
 
 def _other_layout(array: NDArray[Any], name: str, corners: int) -> str | None:
-    """Say how to bring faces or tets into our layout, if they are in one that others use."""
+    """Return a remedy for faces or tets in a layout that other packages use, or None if this is none of them."""
     if array.ndim == 2 and array.shape[1] == corners + 1 and (array[:, 0] == corners).all():
         return f"pass {name}[:, 1:], without the numbers of corners"
     if array.ndim == 1 and len(array) % (corners + 1) == 0 and (array[:: corners + 1] == corners).all():
@@ -325,14 +349,14 @@ def _other_layout(array: NDArray[Any], name: str, corners: int) -> str | None:
 
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:
-    """Return the (2, d) lower and upper corner of the box around the points with the given ids."""
+    """Return the (2, d) lower and upper corner of the box around those of (n, d) points that `ids` name."""
     used = mask_of(len(points), ids.ravel())
     columns = (points if used.all() else points[used]).T
     return np.array([[column.min() for column in columns], [column.max() for column in columns]])
 
 
 def refuse_deleted_folder(path: str | os.PathLike[str]) -> None:
-    """Raise `FileFormatError` if a path is relative to a working folder that has been deleted."""
+    """Raise `FileFormatError` if a path is relative and the current folder has been deleted."""
     try:
         if not os.path.isabs(path):
             os.getcwd()
@@ -346,7 +370,11 @@ T = TypeVar("T")
 
 
 def public_call(function: Callable[P, T]) -> Callable[P, T]:
-    """Decorate a public function: it refuses what was meant otherwise, and says so if memory runs out."""
+    """Decorate a public function, so that common mistakes in its arguments raise errors with a remedy.
+
+    These are vertices and faces as two arguments, and a `progress` that cannot be called. A lack of memory raises
+    `MemoryLimitError`.
+    """
     guarded = within_memory(function)
 
     @wraps(function)
@@ -359,7 +387,7 @@ def public_call(function: Callable[P, T]) -> Callable[P, T]:
 
 
 def refuse_pair_apart(arguments: Sequence[object], name: str) -> None:
-    """Raise if arrays of vertices and of faces are given as two arguments."""
+    """Raise an error if an array of vertices and one of faces are two successive arguments of the function `name`."""
     for index in range(len(arguments) - 1):
         points, rows = arguments[index : index + 2]
         if not is_pair((points, rows)) or min(len(row) for row in cast("Sequence[Sequence[int]]", rows)) < 3:
@@ -373,7 +401,7 @@ def refuse_pair_apart(arguments: Sequence[object], name: str) -> None:
 
 
 def are_points(thing: object) -> bool:
-    """Whether something is an (n, 3) array or list of coordinates."""
+    """Whether an object is an (n, 3) array or list of numbers."""
     try:
         points = np.asarray(thing)
     except ValueError:
@@ -382,7 +410,7 @@ def are_points(thing: object) -> bool:
 
 
 def is_pair(thing: object) -> bool:
-    """Whether something is a pair of arrays (vertices, faces), and not two sources or two numbers."""
+    """Whether an object is a pair of arrays (vertices, faces), and not two sources or two numbers."""
     if not (isinstance(thing, tuple | list) and len(thing) == 2 and all(like_array(part) for part in thing)):
         return False
     points, faces = thing
@@ -394,12 +422,12 @@ def is_pair(thing: object) -> bool:
 
 
 def like_array(part: object) -> bool:
-    """Whether something is an array, or rows of something."""
+    """Whether an object is a list or tuple, or can be converted to an array."""
     return isinstance(part, list | tuple) or hasattr(part, "__array__")
 
 
 def _like_ids(faces: object) -> bool:
-    """Whether something is rows of whole numbers, of equal length or not."""
+    """Whether an object is an array or a list of rows of integers, which may differ in length."""
     rows = faces if hasattr(faces, "__array__") else list(cast("Sequence[object]", faces))
     if isinstance(rows, list):
         return bool(rows) and all(
@@ -409,4 +437,5 @@ def _like_ids(faces: object) -> bool:
 
 
 def _are_whole(ids: NDArray[np.generic], axes: int) -> bool:
+    """Whether an array has an integer type and this number of axes."""
     return ids.ndim == axes and bool(np.issubdtype(ids.dtype, np.integer))

@@ -365,7 +365,7 @@ def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CurveOrientation(Frozen, ShortRepr):
-    """Directions of the pieces of a broken curve, chosen so that together they bound a region.
+    """Directions of the parts of a broken curve, chosen so that together they bound a region.
 
     Attributes
     ----------

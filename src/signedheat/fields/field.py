@@ -71,7 +71,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
     A field that holds its solid is exact at all points, not only on the domain. It stays exact when it is negated,
     multiplied by a number, saved as ``.npz``, or combined with another field that holds its solid. After a number is
     added, it is interpolated. Combinations of fields without solids have the right sign and zero set, but on one side
-    of the boundary their values are only a bound of the distance. `sharpen` turns them into distances.
+    of the boundary their values are only a bound of the distance. `sharpen` computes the distance then.
 
     Parameters
     ----------
@@ -592,9 +592,9 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Returns
         -------
         pyvista.DataSet
-            `pyvista.ImageData` for a grid (with z = 0 in the plane), and for a band the one of its coarse field;
-            `pyvista.UnstructuredGrid` for tets; `pyvista.PolyData` for a surface, cut open where φ jumps. The point
-            data ``signed_distance`` holds φ. If the field has a confidence, the point data ``confidence`` holds it.
+            `pyvista.ImageData` for a grid (with z = 0 in the plane), `pyvista.UnstructuredGrid` for tets, and
+            `pyvista.PolyData` for a surface, cut open where φ jumps. A field in a band gives that of its coarse field.
+            The point data ``signed_distance`` holds φ. If the field has a confidence, ``confidence`` holds it.
 
         Raises
         ------
