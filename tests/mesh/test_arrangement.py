@@ -52,7 +52,7 @@ def test_boxes_that_cross_and_share_planes_are_the_same_however_they_lie(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_turned_boxes_do_not_cross_afterwards(seed):
+def test_rotated_boxes_do_not_cross_afterwards(seed):
     rng = np.random.default_rng(seed)
     points, faces = boxes(-rng.random((12, 3)), 1 + rng.random((12, 3)))
     for k, turn in enumerate(Rotation.random(12, random_state=seed)):

@@ -1,1 +1,1 @@
-"""Distance along polyhedral surfaces: exact, and the shortest paths."""
+"""Exact distance and shortest paths along polyhedral surfaces."""

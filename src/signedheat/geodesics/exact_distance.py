@@ -1,16 +1,18 @@
-"""Distance on a polyhedral surface from line segments and points in its faces: exact, or within a tolerance.
+"""Distance on a polyhedral surface from line segments and points in its faces, exact or within a tolerance.
 
 Windows propagate from face to face in order of distance (Mitchell, Mount & Papadimitriou 1987; Chen & Han 1990), and
 windows that a path through a vertex undercuts are dropped (Xin & Wang 2009). A window is an interval of an edge whose
-points see one source along straight lines: a point, or, since sources here are segments too, a parallel beam
-perpendicular to a segment. Each vertex splits windows, so that their number per edge would grow with distance;
-neighbouring windows that one circular or straight wave front approximates are therefore merged (Surazhsky et al. 2005),
-and the work stays in proportion to the number of faces.
+points see one source along straight lines. The source is a point or, since segments are sources, too, a parallel beam
+perpendicular to a segment. Each vertex splits windows, so that their number per edge would grow with distance.
+Therefore neighbouring windows are merged if one circular or straight wave front approximates them (Surazhsky et al.
+2005), and the work stays in proportion to the number of faces.
 
-In the frame of an edge, its tail is at the origin, its head on the positive x axis; waves arrive from below. A window
-is a row ``(s0, s1, p, q, sigma, kind)``: the interval [s0, s1] of the edge, and the wave. Kind `POINT`: circular waves
-from the point (p, q ≤ 0), whose own distance is σ; kind `FOCUS`: circular waves that contract to the point (p, q ≥ 0),
-whose distance would be σ; kind `BEAM`: straight waves along the direction (p, q > 0), σ their distance at the tail.
+In the frame of an edge, its tail is at the origin and its head on the positive x axis. Waves arrive from below, from
+negative y. A window is a row ``(s0, s1, p, q, sigma, kind)`` with the interval [s0, s1] of the edge and the wave:
+
+* Kind `POINT` is a circular wave from the point (p, q ≤ 0), whose own distance is σ.
+* Kind `FOCUS` is a circular wave that contracts to the point (p, q ≥ 0), whose distance would be σ.
+* Kind `BEAM` is a straight wave along the unit vector (p, q > 0), whose distance at the tail of the edge is σ.
 """
 
 from __future__ import annotations
@@ -33,16 +35,17 @@ from .geodesic_sources import GeodesicSources, PlacedSegments, as_curve, nearest
 from .heap_kernels import Queue, pop, push
 
 Report: TypeAlias = Callable[[], None]
-"""Function that is called about every tenth of a second; an exception that it raises ends the search."""
+"""A function that is called about every tenth of a second. An exception that it raises ends the search."""
 
 
 def distance_to_zero_line(
     triangles: IntrinsicMesh, values: Floats, tolerance: float = 1e-4, report: Report | None = None
 ) -> tuple[Floats, int]:
-    """Return the distance of every vertex to the zero set of a function linear in faces, and the number of windows.
+    """Return (n,) distances of vertices to the zero set of a function linear in faces, and the number of windows made.
 
-    Each merge of windows changes distances by less than `tolerance` times the length of their edge. A search that makes
-    `window_limit` windows is cut short, and that is then the number returned.
+    `values` are those of the function at vertices, (n,). Each merge of windows changes distances by less than
+    `tolerance` times the length of their edge. A search is cut short after `window_limit` windows, and then returns
+    that number. Distances it has not found are lengths of paths along edges, which are too long.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     return distance_to_segments(triangles, zero_line(triangles, values), tolerance, report)
@@ -55,13 +58,13 @@ def distance_to_segments(
     report: Report | None = None,
     reach: float = np.inf,
 ) -> tuple[Floats, int]:
-    """Return the distance of every vertex to segments and points as `distance_to_zero_line` does; inf beyond `reach`.
+    """Return (n,) distances of vertices to segments and points, and the number of windows; see `distance_to_zero_line`.
 
-    The work is in proportion to the number of faces within `reach`.
+    Distances are infinite beyond `reach`, and the work is in proportion to the number of faces within it.
     """
     limit = window_limit(triangles)
     placed = through_vertices(triangles, placed)
-    # a longer search is started anew in Delaunay triangles: the long edges of slivers see every segment of a curve
+    # a longer search is started anew in Delaunay triangles, since long edges of slivers see every segment of a curve
     many = min(30 * triangles.n_edges + 50_000, limit)
     search = PausedSearch.start(triangles, placed, tolerance, reach).until(many, report)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
@@ -74,9 +77,9 @@ def distance_to_segments(
 
 
 def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
-    """Return values, (n,), with those near zero moved to ±`least`, so that the zero set passes no vertex.
+    """Return (n,) values at vertices, with those near zero replaced by ±`least`, so that no vertex is in the zero set.
 
-    Their sign is the one that fewer of their neighbours have.
+    The sign is the one that fewer of the neighbours have.
     """
     near = np.abs(values) < least
     signs = np.where(near | np.isnan(values), 0.0, np.sign(values))
@@ -86,7 +89,10 @@ def cleared(triangles: IntrinsicMesh, values: Floats, least: float) -> Floats:
 
 
 def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
-    """Return (n,) whether shortest paths can pass through a vertex: on a boundary, or with a total angle above 2π."""
+    """Return (n,) bool, true for vertices through which shortest paths can pass.
+
+    These are on a boundary or at edges of three or more faces, or their total angle exceeds 2π.
+    """
     angles = np.arctan2(1.0, triangles.corner_cotangents)
     total = np.bincount(triangles.corner_vertices.ravel(), angles.ravel(), triangles.n_vertices)
     special = total > 2 * np.pi + 1e-9
@@ -95,9 +101,9 @@ def is_pseudosource(triangles: IntrinsicMesh) -> Bools:
 
 
 def window_limit(triangles: IntrinsicMesh) -> int:
-    """Return the number of windows at which a search is cut short.
+    """Return the number of windows after which a search is cut short.
 
-    Ten per edge are usual on smooth surfaces. Small meshes of many sheets make more, which is little in all.
+    On smooth surfaces there are usually ten for each edge. On small meshes with many sheets there may be far more.
     """
     return min(3000 * triangles.n_faces, 100 * triangles.n_edges + 4_000_000)
 
@@ -116,7 +122,7 @@ class PausedSearch:
     def start(
         cls, triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float, reach: float = np.inf
     ) -> PausedSearch:
-        """Start with the waves that leave the sources."""
+        """Start a search with the waves that leave the sources."""
         sources, pseudosources = placed.sources(triangles), is_pseudosource(triangles)
         pseudosources[sources.vertices] = True
         with np.errstate(all="ignore"):  # on faces of no size: `propagate_across` drops NaN
@@ -131,12 +137,12 @@ class PausedSearch:
 
     @property
     def slack(self) -> float:
-        """How much longer than another a path must be to be dropped, relative to the length of the edge."""
+        """Difference, relative to the length of an edge, by which a path must be longer than another to be dropped."""
         return DISTANCE_ROUNDING + 2.0 * self.tolerance
 
     @property
     def has_ended(self) -> bool:
-        """Whether nothing is left to propagate within reach."""
+        """Whether no window and no vertex within reach is left to propagate."""
         return not is_waiting(self.search.queue, self.reach)
 
     @property
@@ -157,7 +163,10 @@ class PausedSearch:
         return self
 
     def distance(self) -> Floats:
-        """Return (n,) distances, inf beyond reach; those within it that the search has not found go along edges."""
+        """Return (n,) distances of vertices, infinite beyond reach.
+
+        If the search has not reached a vertex, its distance is the length of a path along edges.
+        """
         distance = self.search.distance
         if np.isfinite(self.reach) and self.has_ended:
             return np.where(distance <= self.reach, distance, np.inf)
@@ -171,7 +180,10 @@ class PausedSearch:
 
 
 def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Floats) -> Floats:
-    """Return (n,) distances along edges if those of (k,) vertices are at most `offsets`; inf where no path leads."""
+    """Return (n,) lengths of shortest paths along edges from k vertices that are at distances `offsets`, (k,).
+
+    They are infinite for vertices that no path reaches.
+    """
     n = triangles.n_vertices
     tails, heads = np.concatenate([triangles.edges.vertices, np.stack([np.full(len(vertices), n), vertices], axis=1)]).T
     graph = shortest_arcs(tails, heads, np.concatenate([triangles.lengths_of_edges, offsets]), n + 1)
@@ -179,7 +191,7 @@ def distances_along_edges(triangles: IntrinsicMesh, vertices: Ints, offsets: Flo
 
 
 def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matrix:
-    """Return lengths of arcs in an (n, n) matrix; where several lead from one node to another, the shortest counts."""
+    """Return the sparse (n, n) matrix of the lengths of arcs between n nodes, the shortest of several between two."""
     order = np.lexsort([lengths, heads, tails])
     tails, heads, lengths = tails[order], heads[order], lengths[order]
     first = np.ones(len(order), dtype=bool)
@@ -191,7 +203,10 @@ def shortest_arcs(tails: Ints, heads: Ints, lengths: Floats, n: int) -> csr_matr
 def in_delaunay_triangles(
     triangles: IntrinsicMesh, placed: PlacedSegments
 ) -> tuple[IntrinsicMesh, PlacedSegments] | None:
-    """Return the surface in Delaunay triangles, and sources along their edges; None if that gains nothing or fails."""
+    """Return the surface with Delaunay triangles, and the sources along their edges.
+
+    Returns None if most edges are Delaunay already, or the sources cannot be moved to edges.
+    """
     if not triangles.agree_on_lengths or share_to_flip(triangles) < 0.05:
         return None
     curve = as_curve(triangles, placed)
@@ -203,19 +218,19 @@ def in_delaunay_triangles(
 
 
 def share_to_flip(triangles: IntrinsicMesh) -> float:
-    """Return the share of edges that are not Delaunay: their opposite angles, in two faces, sum to more than π."""
+    """Return the share of edges that are not Delaunay, since their opposite angles in two faces sum to more than π."""
     opposite = np.roll(triangles.corner_cotangents, 1, axis=1)  # the corner facing edge k is k + 2
     sums = np.bincount(triangles.edges.face_edges.ravel(), opposite.ravel(), triangles.n_edges)
     return float(((sums < -1e-9) & (triangles.edges.face_counts == 2)).mean())
 
 
 DISTANCE_ROUNDING = 1e-10
-"""Rounding error of distances, relative to the length of an edge."""
+"""Difference of distances, relative to the length of an edge, up to which it is rounding error."""
 
 
 @compiled
 def _reach(search: Search, v: int, length: float) -> None:
-    """Record a path to a vertex if none so far is as short, and queue the vertex if paths bend around it."""
+    """Record a path of a given length to vertex v if it is the shortest so far; queue v if paths can bend around it."""
     if length < search.distance[v] * (1.0 - 1e-14):
         search.distance[v] = length
         if search.pseudosources[v]:
@@ -226,7 +241,11 @@ def _reach(search: Search, v: int, length: float) -> None:
 def _collect(
     search: Search, halfedge: int, at_tail: float, at_head: float, length: float, slack: float, tolerance: float
 ) -> tuple[Floats, int]:
-    """Take the windows queued for a halfedge; return what is nearest of them, in order and merged, and their number."""
+    """Take the windows queued for a halfedge out of their list, and return those that are nearest to some source.
+
+    `at_tail` and `at_head` are distances of the ends of the edge, and `length` its length. Windows are trimmed where
+    others are nearer, sorted along the edge, and merged. Returns rows of windows, and how many of the rows are used.
+    """
     queued, settled, windows, following, counts = (
         search.queued,
         search.settled,
@@ -241,10 +260,10 @@ def _collect(
     count, row = 0, queued[halfedge]
     while row >= 0:
         w = windows[row]
-        is_left, other = not outrun(w, at_tail, at_head, length, slack), settled[halfedge]
-        while is_left and other >= 0:
-            trim_by(windows[other], w, DISTANCE_ROUNDING * length)
-            is_left, other = w[S1] - w[S0] > 1e-12 * length, following[other]
+        is_left, old = not outrun(w, at_tail, at_head, length, slack), settled[halfedge]
+        while is_left and old >= 0:
+            trim_by(windows[old], w, DISTANCE_ROUNDING * length)
+            is_left, old = w[S1] - w[S0] > 1e-12 * length, following[old]
         if is_left:
             k = count
             while k > 0 and chosen[k - 1, S0] > w[S0]:
@@ -273,7 +292,10 @@ def _collect(
 
 @compiled
 def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
-    """Add `count` rows of `chosen` to the windows that have crossed a halfedge, and drop those that they outdo."""
+    """Add the first `count` rows of `chosen` to the windows that have crossed a halfedge.
+
+    Windows that crossed it before, and are farther than a new one all along, are dropped.
+    """
     settled, windows, following, counts = search.settled, search.windows, search.following, search.counts
     row, before = settled[halfedge], -1
     while row >= 0:
@@ -298,7 +320,7 @@ def _settle(search: Search, halfedge: int, chosen: Floats, count: int) -> None:
 
 @compiled
 def list_length(following: Ints, row: int) -> int:
-    """Return the number of windows in the linked list that begins with a row, or −1 if it is empty."""
+    """Return the number of windows in the linked list whose first row is `row`, −1 for an empty list."""
     count = 0
     while row >= 0:
         count += 1
@@ -314,7 +336,10 @@ def is_waiting(queue: Queue, reach: float) -> bool:
 
 @compiled
 def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, reach: float, limit: int) -> None:
-    """Propagate in order of distance, up to `reach`, until rows are missing or `limit` windows have been made."""
+    """Propagate in order of distance, up to `reach`, until rows are missing or `limit` windows have been made.
+
+    If rows for windows are missing, their number is written to ``search.counts[MISSING_ROWS]``.
+    """
     queue, counts = search.queue, search.counts
     while is_waiting(queue, reach) and counts[WINDOWS_MADE] < limit:
         item = queue.items[0]
@@ -333,7 +358,7 @@ def continue_search(faces: Faces, search: Search, slack: float, tolerance: float
 
 @compiled
 def _bend_around(faces: Faces, search: Search, v: int, slack: float) -> None:
-    """Send circular waves from a vertex that paths bend around, along its edges and across its faces."""
+    """Propagate circular waves from vertex v, around which paths can bend, along its edges and across its faces."""
     for k in range(faces.first_corner[v], faces.first_corner[v + 1]):
         face, corner = faces.corners[k] // 3, faces.corners[k] % 3
         source = faces.positions[face, corner]
@@ -347,7 +372,7 @@ def _bend_around(faces: Faces, search: Search, v: int, slack: float) -> None:
 
 @compiled
 def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, tolerance: float) -> None:
-    """Send the windows queued at a halfedge through its face: to the corner across, and to the two other sides."""
+    """Propagate the windows queued at a halfedge through its face, to the opposite corner and the two other sides."""
     face, side = halfedge // 3, halfedge % 3
     edge = faces.edges[face, side]
     length = faces.lengths[edge]
@@ -397,7 +422,10 @@ def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, toler
 
 
 POINT, BEAM, FOCUS = 1.0, 0.0, -1.0
+"""Kinds of waves. The values are signs by which `arrival` multiplies the distance from the point of a circular wave."""
+
 S0, S1, P, Q, SIGMA, KIND = range(6)
+"""Columns of the row of a window."""
 
 
 @compiled
@@ -409,7 +437,7 @@ def put(window: Floats, rows: Floats, k: int) -> None:
 
 @compiled
 def arrival(w: Floats, x: float, y: float) -> float:
-    """Return the distance from the source of a window to a point in the frame of its edge."""
+    """Return the distance of a point (x, y), in the frame of the edge of a window, from the source of the window."""
     if w[KIND] == BEAM:
         return w[SIGMA] + w[P] * x + w[Q] * y
     return w[SIGMA] + w[KIND] * np.sqrt((x - w[P]) ** 2 + (y - w[Q]) ** 2)
@@ -425,7 +453,10 @@ def ray(w: Floats, x: float) -> tuple[float, float]:
 
 @compiled
 def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: float) -> bool:
-    """Return whether paths through one end of the edge are shorter, by more than `slack`, everywhere in a window."""
+    """Return whether paths through an end of the edge are shorter, by more than `slack`, at all points of a window.
+
+    `at_tail` and `at_head` are the distances of the ends, and `length` is that of the edge.
+    """
     if at_tail + w[S1] < arrival(w, w[S1], 0.0) - slack:
         return True
     return at_head + length - w[S0] < arrival(w, w[S0], 0.0) - slack
@@ -433,7 +464,7 @@ def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: floa
 
 @compiled
 def trim(a: Floats, b: Floats) -> None:
-    """Trim two overlapping windows, of which a begins first, to where each has the smaller distance."""
+    """Trim two overlapping windows in place to the parts in which each has the smaller distance; a begins first."""
     if b[S0] >= a[S1]:
         return
     low, high = b[S0], min(a[S1], b[S1])
@@ -463,7 +494,10 @@ def trim(a: Floats, b: Floats) -> None:
 
 @compiled
 def trim_by(old: Floats, w: Floats, slack: float) -> None:
-    """Trim window w to where it is nearer than an older one by more than `slack`, but cut no gap into its middle."""
+    """Trim an end of window w in place where it is not nearer than an older one by more than `slack`.
+
+    No gap is cut into its middle.
+    """
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:
         return
@@ -494,7 +528,7 @@ def trim_by(old: Floats, w: Floats, slack: float) -> None:
 
 @compiled
 def outdoes(w: Floats, old: Floats) -> bool:
-    """Return whether a window covers another one and is nearer at its ends and in its middle."""
+    """Return whether window w covers an older one, and is as near at both ends and in the middle of that."""
     if w[S0] > old[S0] or w[S1] < old[S1]:
         return False
     for k in range(3):
@@ -506,7 +540,10 @@ def outdoes(w: Floats, old: Floats) -> bool:
 
 @compiled
 def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
-    """Merge window b into a if they are neighbours and one wave approximates both; return whether it was done."""
+    """Merge window b into a, in place, if they are neighbours and one wave approximates both; return whether it does.
+
+    The error at the ends and between the windows is at most `tolerance` times the `length` of the edge.
+    """
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
     s0, between, s1 = a[S0], a[S1], b[S1]
@@ -544,7 +581,10 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
 
 @compiled
 def straighten(w: Floats) -> None:
-    """Replace a wave that would pass its focus in the face ahead by a straight one, not nearer at the window's ends."""
+    """Replace the wave of a window by a straight one, in place, that is not nearer at the ends of the window.
+
+    This is for waves that would contract to their focus in the face ahead.
+    """
     x, y = ray(w, 0.5 * (w[S0] + w[S1]))
     norm = np.sqrt(x * x + y * y)
     begin, end = arrival(w, w[S0], 0.0), arrival(w, w[S1], 0.0)
@@ -554,7 +594,7 @@ def straighten(w: Floats) -> None:
 
 @compiled
 def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Return the fraction of the way from a to b at which the ray from (x0, 0) along (dx, dy) meets their line."""
+    """Return the fraction, from 0 to 1, of segment ab at which the ray from (x0, 0) along (dx, dy) meets its line."""
     ex, ey = bx - ax, by - ay
     det = dx * ey - dy * ex
     if det == 0.0:
@@ -563,18 +603,18 @@ def hit(x0: float, dx: float, dy: float, ax: float, ay: float, bx: float, by: fl
 
 
 class Faces(NamedTuple):
-    """An intrinsic mesh as plain arrays, with the halfedges of each edge and the corners at each vertex in lists."""
+    """An intrinsic mesh as plain arrays, with lists of the halfedges of each edge and of the corners at each vertex."""
 
     vertices: Ints  # (m, 3) vertex at each corner
     positions: Complexes  # (m, 3) position of each corner in the layout of the face
     edges: Ints  # (m, 3) edge along each side
     forward: Bools  # (m, 3) whether the side runs along that edge from tail to head
     edge_vertices: Ints  # (e, 2) tail and head of each edge
-    lengths: Floats  # (e,)
+    lengths: Floats  # (e,) length of each edge
     halfedges: Ints  # (3m,) those of edge e are halfedges[first_halfedge[e] : first_halfedge[e + 1]]
-    first_halfedge: Ints  # (e + 1,)
-    corners: Ints  # (3m,) corners 3 f + k, by vertex in the same way
-    first_corner: Ints  # (n + 1,)
+    first_halfedge: Ints  # (e + 1,) offsets of the halfedges of each edge
+    corners: Ints  # (3m,) corners 3 f + k; those at vertex v are corners[first_corner[v] : first_corner[v + 1]]
+    first_corner: Ints  # (n + 1,) offsets of the corners at each vertex
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
@@ -588,25 +628,25 @@ class Faces(NamedTuple):
 
 
 class Search(NamedTuple):
-    """The state of a search: distances so far, and for each halfedge lists of windows, queued to go on or settled.
+    """State of a search, with distances so far, and lists of windows that wait at each halfedge or have crossed it.
 
-    Windows are rows of one array, in linked lists; one more list has the free rows. Row 0 is for scratch. Items of the
-    queue are the 3m halfedges, and then the n vertices that paths bend around.
+    Windows are rows of one array, in linked lists. One more list has the free rows. Row 0 is a work array. Items of the
+    queue are the 3m halfedges, followed by the n vertices, of which only those around which paths bend are queued.
     """
 
-    distance: Floats  # (n,)
+    distance: Floats  # (n,) shortest distance of each vertex so far, or infinity
     pseudosources: Bools  # (n,) whether paths can bend around each vertex
-    queue: Queue
+    queue: Queue  # items in order of the distance at which they propagate
     queued: Ints  # (3m,) first row of the windows that wait at each halfedge, or −1
-    settled: Ints  # (3m,) first row of the windows that have crossed it, or −1
-    windows: Floats  # (r, 6)
+    settled: Ints  # (3m,) first row of the windows that have crossed each halfedge, or −1
+    windows: Floats  # (r, 6) rows of windows
     following: Ints  # (r,) the next row of the same list, or −1
-    counts: Ints  # (4,) see `USED_ROWS`
-    most: Ints  # (3m + n,) most windows that an item of the queue makes; for a halfedge, from each of its windows
+    counts: Ints  # (4,) numbers at the indices `USED_ROWS` and following
+    most: Ints  # (3m + n,) largest number of windows that each item makes; for a halfedge, from each of its windows
 
     @classmethod
     def start(cls, triangles: IntrinsicMesh, pseudosources: Bools, room: int) -> Search:
-        """Return the state before the first wave, with room for this many windows."""
+        """Return the state before the first wave, with room for `room` windows."""
         n, m = triangles.n_vertices, triangles.n_faces
         queue, lists = Queue.empty(3 * m + n), (np.full(3 * m, -1), np.full(3 * m, -1))
         windows, following = np.empty((room, 6)), np.empty(room, dtype=np.int64)
@@ -617,7 +657,7 @@ class Search(NamedTuple):
         return cls(np.full(n, np.inf), pseudosources, queue, *lists, windows, following, counts, most)
 
     def larger(self) -> Search:
-        """Add at least the rows that were missing, in place: a copy would need twice the memory."""
+        """Enlarge the arrays of windows in place by at least the missing rows; a copy would need twice the memory."""
         room = len(self.windows) + max(len(self.windows) // 2, int(self.counts[MISSING_ROWS]))
         refuse_beyond_memory(
             "exact distance along the surface",
@@ -631,12 +671,13 @@ class Search(NamedTuple):
 
 
 USED_ROWS, FIRST_FREE, WINDOWS_MADE, MISSING_ROWS = range(4)
-"""Places in `Search.counts` of the rows ever used, the first free one of these, windows made, and rows missing."""
+"""Indices in `Search.counts` of the number of rows ever used, the first free row, and the numbers of windows made and
+of missing rows."""
 
 
 @compiled
 def take_row(counts: Ints, following: Ints) -> int:
-    """Return a row for a new window; there must be room."""
+    """Take a free row for a new window, and return it; there must be room."""
     row = counts[FIRST_FREE]
     if row >= 0:
         counts[FIRST_FREE] = following[row]
@@ -667,9 +708,10 @@ def propagate_across(
     sigma: float,
     slack: float,
 ) -> None:
-    """Propagate a wave across fractions t0 to t1 of a side of a face to the faces beyond.
+    """Propagate a wave across a side of a face, between fractions t0 and t1 of it, to the faces beyond.
 
-    A circular wave comes from `point`, or contracts to it; a beam passes it along `normal`. There the distance is σ.
+    A circular wave comes from `point`, or contracts to it. A beam passes `point` in the direction of the unit vector
+    `normal`. Both are in the layout of the face, and `sigma` is the distance at `point`.
     """
     edge = faces.edges[face, side]
     length = faces.lengths[edge]
@@ -691,12 +733,12 @@ def propagate_across(
     w[S0], w[S1], w[KIND] = t0 * length, t1 * length, kind
     unit = (b - a) / length
     if kind == BEAM:
-        turned = normal * unit.conjugate()
-        w[P], w[Q] = turned.real, abs(turned.imag)
+        in_frame = normal * unit.conjugate()
+        w[P], w[Q] = in_frame.real, abs(in_frame.imag)
         w[SIGMA] = sigma - ((point - a) * normal.conjugate()).real
     else:
-        turned = (point - a) * unit.conjugate()
-        w[P], w[Q], w[SIGMA] = turned.real, -kind * abs(turned.imag), sigma
+        in_frame = (point - a) * unit.conjugate()
+        w[P], w[Q], w[SIGMA] = in_frame.real, -kind * abs(in_frame.imag), sigma
     tail, head = faces.edge_vertices[edge]
     if outrun(w, search.distance[tail], search.distance[head], length, slack * length):
         return
@@ -717,7 +759,7 @@ def propagate_across(
 
 @compiled
 def start_search(faces: Faces, waves: Waves, search: Search, slack: float) -> None:
-    """Make the first windows, and queue the vertices with known distances around which paths can bend."""
+    """Make the windows of the first waves, and queue vertices with a known distance around which paths can bend."""
     for i in range(len(waves.halfedges)):
         face, side = waves.halfedges[i] // 3, waves.halfedges[i] % 3
         kind, t0, t1 = waves.kinds[i], waves.begins[i], waves.ends[i]
@@ -728,19 +770,19 @@ def start_search(faces: Faces, waves: Waves, search: Search, slack: float) -> No
 
 
 class Waves(NamedTuple):
-    """The waves that leave sources, each through a part of one side of a face: see `propagate_across`."""
+    """w waves that leave sources, each through a part of one side of a face, as arguments of `propagate_across`."""
 
-    halfedges: Ints  # 3 f + k, for side k of face f
-    kinds: Floats
-    # fractions of the side between which they pass
+    halfedges: Ints  # (w,) 3 f + k for side k of face f
+    kinds: Floats  # (w,) POINT or BEAM
+    # (w,) fractions of the side between which they pass
     begins: Floats
     ends: Floats
-    points: Complexes
-    normals: Complexes
+    points: Complexes  # (w,) point from which a circular wave comes, or which a beam passes
+    normals: Complexes  # (w,) direction of a beam
 
 
 def reach_corners(triangles: IntrinsicMesh, sources: GeodesicSources, distance: Floats) -> None:
-    """Lower the distance of the corners of faces to that from the segments and points in them."""
+    """Lower (n,) distances of the corners of faces, in place, to those from the segments and points in the faces."""
     faces = np.concatenate([sources.beam_faces, sources.fan_faces])
     starts = np.concatenate([sources.beam_starts, sources.fan_points])[:, None]
     steps = np.concatenate([sources.beam_stops, sources.fan_points])[:, None] - starts
@@ -749,9 +791,10 @@ def reach_corners(triangles: IntrinsicMesh, sources: GeodesicSources, distance: 
 
 
 def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
-    """Return where parallel beams to the left of segments, and circular waves from points, meet sides of their faces.
+    """Return the waves that leave sources through sides of their faces.
 
-    A beam is as wide as its segment; a fan has the directions that are more than 90° from both of its own.
+    These are beams to the left of segments, as wide as the segment, and circular waves from points, in the directions
+    that are more than 90° from both directions of the fan.
     """
     faces, starts = sources.beam_faces, sources.beam_starts[:, None]
     lengths = np.abs(sources.beam_stops[:, None] - starts)
@@ -777,12 +820,16 @@ def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
 
 
 def dot(a: Complexes, b: Complexes) -> Floats:
-    """Return scalar products of plane vectors."""
+    """Return scalar products of plane vectors, given as complex numbers."""
     return (a * np.conj(b)).real
 
 
 def parts_within(chosen: Bools, *bounds: tuple[Floats, Floats]) -> tuple[Ints, Ints, Floats, Floats]:
-    """Return where 0 ≤ s ≤ 1 and ``a + b s ≤ 0`` for all bounds (a, b) on chosen sides: row, side, first and last s."""
+    """Return the parts of sides of faces on which linear inequalities hold.
+
+    A part has the fractions s of a side, from 0 to 1, with ``a + b s ≤ 0`` for all bounds (a, b), where a, b and
+    `chosen` are (k, 3). Returns rows, sides, and first and last fractions, for chosen sides with such a part.
+    """
     begins, ends = np.zeros(chosen.shape), np.ones(chosen.shape)
     for at_tail, slope in bounds:
         zero = -at_tail / np.where(slope != 0, slope, 1.0)

@@ -1,6 +1,6 @@
 """Sources of exact distance on a polyhedral surface: beams from segments, and fans from their ends.
 
-The waves that leave a segment are two parallel beams, one to each side, and at its ends circular waves. Of these only
+The waves that leave a segment are a parallel beam to each side, and circular waves at its ends. Of a circular wave only
 the fan between the beams of neighbouring segments can be shortest, so that curves of many segments start few windows.
 """
 
@@ -33,14 +33,15 @@ from ..mesh.surface_points import (
 
 
 class GeodesicSources(NamedTuple):
-    """Where distance is zero, and the directions in which it grows. Positions are in the layouts of the faces."""
+    """Points and segments from which distance is measured. Positions are in the layouts of their faces."""
 
-    vertices: Ints  # (v,) vertices at which distance is zero, including those of curves
-    # (b,) segments from which a parallel beam leaves to the left
+    vertices: Ints  # (v,) vertices at which distance is zero, including those on curves
+    # (b,) faces, starts and ends of segments from which a parallel beam leaves to the left
     beam_faces: Ints
     beam_starts: Complexes
     beam_stops: Complexes
-    # (a,) points from which circular waves leave, in directions more than 90° from both given ones; these may be 0
+    # (a,) faces and positions of points from which circular waves leave, in the directions that are more than 90° from
+    # the first and the second direction, which may be 0
     fan_faces: Ints
     fan_points: Complexes
     fan_firsts: Complexes
@@ -49,12 +50,12 @@ class GeodesicSources(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PlacedSegments:
-    """Segments with the positions of their ends in faces, which are unique even where a node is in a face twice."""
+    """k segments with the positions of their ends in faces, which are clear even where a node is in a face twice."""
 
     nodes: LocatedPoints  # (s,) distinct points
-    ends: Ints  # (k, 2) the nodes that each segment joins
+    ends: Ints  # (k, 2) nodes at the start and the end of each segment
     faces: Ints  # (k,) the face of each; a segment along an edge is listed once for every face at the edge
-    # (k, 2) both ends, in the layout of the face; along an edge in the direction that has the face to its left
+    # (k, 2) positions of both ends in the layout of the face; along an edge in the direction with the face to its left
     positions: Complexes
     along_edge: Bools  # (k,) whether the segment runs along an edge of its face
     sides: Ints  # (k,) 1 where φ grows to the left of the segment, −1 where it grows to the right, 0 on both sides
@@ -72,6 +73,7 @@ class PlacedSegments:
     def _inside(
         triangles: IntrinsicMesh, merged: MergedSources, oriented: Bools
     ) -> tuple[Ints, Ints, Complexes, Bools, Ints, Ints]:
+        """Place the segments inside faces; return the fields of the class from `ends` on."""
         nodes, rows = merged.nodes, np.flatnonzero(merged.edges < 0)
         ends, faces, vectors = merged.ends[rows], merged.faces[rows], merged.vectors[rows]
         corners = triangles.corner_positions[faces]
@@ -89,6 +91,7 @@ class PlacedSegments:
     def _adjacent(
         triangles: IntrinsicMesh, merged: MergedSources, oriented: Bools
     ) -> tuple[Ints, Ints, Complexes, Bools, Ints, Ints]:
+        """Place the segments along edges in all faces at the edge; return the fields of the class from `ends` on."""
         nodes, rows = merged.nodes, np.flatnonzero(merged.edges >= 0)
         ends, edges, vectors = merged.ends[rows], merged.edges[rows], merged.vectors[rows]
         along = np.stack([fractions_along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
@@ -106,13 +109,13 @@ class PlacedSegments:
         swapped = (along[:, 1] < along[:, 0]) == forward
         along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
         positions = on_sides(triangles, faces, local_sides, along)
-        seen = triangles.from_edge_frames(vectors[owners], faces, local_sides)
-        sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, local_sides]) * seen).real).astype(np.int64)
+        normals = triangles.from_edge_frames(vectors[owners], faces, local_sides)
+        sides = np.sign((np.conj(1j * triangles.edge_vectors[faces, local_sides]) * normals).real).astype(np.int64)
         return ends, faces, positions, np.ones(len(faces), dtype=bool), sides * oriented[rows][owners], rows[owners]
 
     @cached_property
     def lengths(self) -> Floats:
-        """(k,) length of each segment."""
+        """Length of each segment, (k,) float."""
         return np.abs(self.positions[:, 1] - self.positions[:, 0])
 
     def joined(self, more: PlacedSegments) -> PlacedSegments:
@@ -129,7 +132,7 @@ class PlacedSegments:
         )
 
     def sources(self, triangles: IntrinsicMesh) -> GeodesicSources:
-        """Return the waves that leave the segments, and points at which no segment ends."""
+        """Return the beams and fans that leave the segments and the isolated points."""
         inside = np.flatnonzero(~self.along_edge)
         faces = np.concatenate([self.faces, self.faces[inside]])
         starts = np.concatenate([self.positions[:, 0], self.positions[inside, 1]])
@@ -138,7 +141,10 @@ class PlacedSegments:
         return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
 
     def _fans(self, triangles: IntrinsicMesh) -> tuple[Ints, Complexes, Complexes, Complexes]:
-        """Return the fans at nodes inside faces and on edges; for a node on an edge, one in every face at the edge."""
+        """Return the faces, points, first and second directions of fans at nodes in faces and on edges.
+
+        A node on an edge has a fan in every face at the edge.
+        """
         nodes = self.nodes
         first, second = self._directions(triangles)
         inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
@@ -153,9 +159,9 @@ class PlacedSegments:
         return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
-        """Return (s,) directions along the first and along the last segment at each node, 0 if there is none.
+        """Return (s,) unit vectors along the first segment at each node, and along the last, 0 if there is none.
 
-        They are in the layout of the node's face, or, for a node on an edge, in the frame of the edge.
+        They are in the layout of the node's face or, for a node on an edge, in the frame of the edge.
         """
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]
@@ -165,8 +171,8 @@ class PlacedSegments:
         at_edge = np.flatnonzero(kinds[node] == EDGE)
         faces, edges = self.faces[seg[at_edge]], nodes.elements[node[at_edge]]
         along = np.repeat(nodes.along[node[at_edge]], 3)[:, None]
-        places = on_sides(triangles, np.repeat(faces, 3), np.tile(np.arange(3), len(faces)), along)
-        gap = np.abs(places.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
+        on_each_side = on_sides(triangles, np.repeat(faces, 3), np.tile(np.arange(3), len(faces)), along)
+        gap = np.abs(on_each_side.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
         k = np.where(triangles.edges.face_edges[faces] == edges[:, None], gap, np.inf).argmin(axis=1)
         away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)
         branching = (triangles.edges.face_counts[edges] > 2) & ~self.along_edge[seg[at_edge]]
@@ -180,7 +186,11 @@ class PlacedSegments:
 
 
 def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = None) -> PlacedSegments:
-    """Return the zero set, in faces `among`, of a function linear in faces: 0 at no vertex, NaN where unknown."""
+    """Return the zero set of a function that is linear in faces, as segments with positive values to their left.
+
+    `values` at vertices, (n,), are not 0, and NaN where unknown. With `among`, (m,), only faces for which it is true
+    count.
+    """
     corner_values = values[triangles.corner_vertices]
     faces, sides = crossed_sides(
         corner_values > 0, ~np.isnan(corner_values).any(axis=1) & (True if among is None else among)
@@ -206,54 +216,66 @@ def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = No
 
 
 def nearest_shares(points: Complexes, steps: Complexes) -> tuple[Floats, Floats]:
-    """Return the fractions of steps from the origin at which they are nearest to points, and the distances there."""
+    """Find the nearest points of segments from the origin, with vectors `steps`, to `points`.
+
+    Returns the fractions of the segments, from 0 to 1, at which they are nearest, and the distances.
+    """
     squares = np.abs(steps) ** 2
     shares = np.clip((points * np.conj(steps)).real / np.where(squares > 0, squares, 1.0), 0.0, 1.0)
     return shares, np.abs(points - shares * steps)
 
 
 def halfedges_of(triangles: IntrinsicMesh, edges: Ints) -> tuple[Ints, Ints]:
-    """Return all halfedges ``3 face + side`` of edges, as pairs: index into `edges`, and halfedge."""
+    """Return the halfedges ``3 face + side`` of (k,) edges: (j,) indices into `edges`, and (j,) halfedges."""
     return members_of(*triangles.edges.halfedges, edges)
 
 
 def on_sides(triangles: IntrinsicMesh, faces: Ints, sides: Ints, along: Floats) -> Complexes:
-    """Return (n, k) positions at fractions (n, k) along the edges, tail to head, that are given sides of faces."""
+    """Return (n, k) positions, in the layouts of (n,) faces, at fractions along edges that are sides of these faces.
+
+    The fractions, (n, k), go from the tail of the edge to its head.
+    """
     share = np.where(triangles.edges.forward[faces, sides][:, None], along, 1 - along)
     return triangles.corner_positions[faces, sides][:, None] + share * triangles.edge_vectors[faces, sides][:, None]
 
 
 def fractions_along_edges(triangles: IntrinsicMesh, located: LocatedPoints, edges: Ints) -> Floats:
-    """Return (n,) the fraction of the way from tail to head at which point k lies on edge k."""
+    """Return (n,) fractions, from tail to head, of (n,) edges at which the n points lie on them."""
     return np.where(
         located.kinds == EDGE, located.along, (triangles.edges.vertices[edges, 0] != located.elements).astype(float)
     )
 
 
 def best_match(triangles: IntrinsicMesh, face: int, nodes: LocatedPoints, ends: Ints, length: float) -> Complexes:
-    """Return (2,) positions of two nodes in a face; where they have several, those nearest to `length` apart."""
-    places = []
+    """Return (2,) positions of two nodes in a face.
+
+    If a node is in the face at several positions, those are chosen whose distance is nearest to `length`.
+    """
+    candidates = []
     for node in ends:
         kind, element = nodes.kinds[node], nodes.elements[node]
         if kind == VERTEX:
-            places.append(triangles.corner_positions[face, triangles.corner_vertices[face] == element])
+            candidates.append(triangles.corner_positions[face, triangles.corner_vertices[face] == element])
         elif kind == EDGE:
             sides = np.flatnonzero(triangles.edges.face_edges[face] == element)
             along = np.full((len(sides), 1), nodes.along[node])
-            places.append(on_sides(triangles, np.full(len(sides), face), sides, along)[:, 0])
+            candidates.append(on_sides(triangles, np.full(len(sides), face), sides, along)[:, 0])
         else:
-            places.append((nodes.barycentric[[node]] * triangles.corner_positions[face]).sum(axis=1))
-    gap = np.abs(np.abs(places[1][None] - places[0][:, None]) - length)
+            candidates.append((nodes.barycentric[[node]] * triangles.corner_positions[face]).sum(axis=1))
+    gap = np.abs(np.abs(candidates[1][None] - candidates[0][:, None]) - length)
     i, j = np.unravel_index(int(gap.argmin()), gap.shape)
-    return np.array([places[0][i], places[1][j]])
+    return np.array([candidates[0][i], candidates[1][j]])
 
 
 SNAP = 1e-6
-"""Barycentric coordinate below which a point of a source is put on the edge or at the vertex."""
+"""Barycentric coordinate below which a point of a source is moved to the edge or to the vertex."""
 
 
 def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> PlacedSegments:
-    """Move segments to vertices and edges that they all but pass; if any is moved, all segments lose their sides."""
+    """Move ends of segments to vertices and edges that are nearer than `SNAP`.
+
+    If any is moved, all segments become unoriented. If none is near, or it fails, they are returned as they are.
+    """
     nodes = placed.nodes
     on_edge, inside = nodes.kinds == EDGE, nodes.kinds == FACE
     near = on_edge & (np.minimum(nodes.along, 1 - nodes.along) < SNAP) | inside & (nodes.barycentric < SNAP).any(axis=1)
@@ -262,7 +284,10 @@ def through_vertices(triangles: IntrinsicMesh, placed: PlacedSegments) -> Placed
 
 
 def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments | None:
-    """Return placed segments, each once, and points as a curve without sides; None if a face is glued to itself."""
+    """Return the segments, each once, and the isolated points as an unoriented curve.
+
+    Returns None if barycentric coordinates do not give the positions, as in faces that are glued to themselves.
+    """
     once = np.unique(placed.given, return_index=True)[1]
     faces, nodes = placed.faces[once], placed.nodes
     end_weights = np.stack([barycentric_in(triangles, faces, nodes[placed.ends[once, k]]) for k in range(2)])
@@ -285,6 +310,6 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
 
 
 def rounded(barycentric: Floats) -> Floats:
-    """Set barycentric coordinates below `SNAP` to zero."""
+    """Set (..., 3) barycentric coordinates below `SNAP` to zero, and scale the others to sum 1."""
     kept = np.where(barycentric < SNAP, 0.0, barycentric)
     return kept / kept.sum(axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""A priority queue of numbered items, each in it at most once, so that its size is known beforehand."""
+"""A priority queue of numbered items for compiled kernels, in which each item is at most once."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..compiled import compiled
 
 
 class Queue(NamedTuple):
-    """A binary heap: items by position, the position of each item (−1 outside), their keys, and how many are in it."""
+    """A binary heap of items 0 to n − 1, the one with the smallest key first."""
 
-    items: Ints  # (n,) the first `size` are in the heap
-    places: Ints  # (n,)
-    keys: Floats  # (n,) by item
-    size: Ints  # (1,)
+    items: Ints  # (n,) the items in the heap, of which the first `size` count
+    places: Ints  # (n,) index of each item in the heap, −1 if it is not in it
+    keys: Floats  # (n,) key of each item
+    size: Ints  # (1,) number of items in the heap
 
     @classmethod
     def empty(cls, n_items: int) -> Queue:
@@ -26,13 +26,13 @@ class Queue(NamedTuple):
 
 @compiled
 def before(keys: Floats, a: int, b: int) -> bool:
-    """Return whether item a leaves the queue before item b; equal keys go by number, for reproducible results."""
+    """Return whether item a leaves the queue before item b; of equal keys, the lower item does."""
     return bool(keys[a] < keys[b] or (keys[a] == keys[b] and a < b))
 
 
 @compiled
 def push(queue: Queue, item: int, key: float) -> None:
-    """Put an item into the queue, or move it forward if its key has become smaller."""
+    """Put an item into the queue with a key, or lower its key if it is in the queue with a larger one."""
     items, places, keys, size = queue
     place = places[item]
     if place < 0:

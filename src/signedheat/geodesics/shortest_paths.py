@@ -1,7 +1,7 @@
-"""Geodesic paths: shortest paths across faces, between points that share no face.
+"""Locally shortest paths across faces, between points that are not in a common face.
 
-A *sleeve* is a sequence of faces: each is left through a halfedge, and the next one is entered through another halfedge
-of the same edge. Halfedge ``3 f + k`` of face f runs from corner k to corner k + 1.
+A *sleeve* is a sequence of neighbouring faces. A path leaves each of them through a halfedge, and enters the next one
+through another halfedge of the same edge. Halfedge ``3 f + k`` of face f runs from corner k to corner k + 1.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ from .heap_kernels import Queue, pop, push
 def join(
     triangles: IntrinsicMesh, located: LocatedPoints, start: Ints, end: Ints, name: str
 ) -> tuple[LocatedPoints, Ints, Ints, Ints]:
-    """Join pairs of points by segments in one face each, along geodesic paths where the two share no face.
+    """Join pairs of points by segments in one face each, along geodesic paths if the two are not in a common face.
 
-    Returns all points, the given ones first; the start and the end of each segment, (s,) indices of points, pair after
-    pair; and the pair that it belongs to.
+    `start` and `end` are indices of points, (p,). Returns all points, the given ones first, (s,) starts and (s,) ends
+    of segments as indices of points, pair after pair, and (s,) the pair of each segment. `name` is for error messages.
     """
     apart = np.flatnonzero(shared_faces(triangles, located[start], located[end]) < 0)
     added = np.zeros(len(start), dtype=np.int64)
@@ -50,7 +50,7 @@ def join(
 
 
 def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints:
-    """Return the indices of the segments of a curve through points whose two ends share no face."""
+    """Return the indices of those segments of a curve through points whose two ends are not in a common face."""
     start = np.arange(len(located) if closed else len(located) - 1)
     return np.flatnonzero(shared_faces(triangles, located[start], located[(start + 1) % len(located)]) < 0)
 
@@ -58,7 +58,10 @@ def gaps(triangles: IntrinsicMesh, located: LocatedPoints, closed: bool) -> Ints
 def geodesic_paths(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str = "curve"
 ) -> tuple[LocatedPoints, Ints]:
-    """Return the points at which locally shortest paths cross edges or pass vertices, and their number on each path."""
+    """Find locally shortest paths between p pairs of points.
+
+    Returns the points at which the paths cross edges or pass vertices, path after path, and (p,) their number on each.
+    """
     starts, ends = Places.of(triangles, start), Places.of(triangles, end)
     sides, fractions, counts = _shortest_lines(Faces.of(triangles), Routes.on(triangles), starts, ends)
     located = locate_points(triangles, sides // 3, barycentric_on_sides(sides % 3, fractions), name)
@@ -77,11 +80,11 @@ def geodesic_paths(
 
 
 class Places(NamedTuple):
-    """The faces that contain each of some points: for point i, ``faces[first[i] : first[i + 1]]``."""
+    """The faces that contain each of n points; those of point i are ``faces[first[i] : first[i + 1]]``."""
 
-    faces: Ints
-    points: Complexes  # the position of the point in the layout of each face
-    first: Ints
+    faces: Ints  # (k,) ids of faces
+    points: Complexes  # (k,) position of the point in the layout of each face
+    first: Ints  # (n + 1,) offsets of the faces of each point
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, located: LocatedPoints) -> Places:
@@ -95,15 +98,15 @@ class Places(NamedTuple):
 
 
 class Routes(NamedTuple):
-    """Arrays for Dijkstra's algorithm on the midpoints of edges, reset after each search."""
+    """Arrays for Dijkstra's algorithm on the midpoints of edges, which are reset after each search."""
 
-    cost: Floats  # (e,) length of the path to the middle of each edge
-    # (e,) halfedge through which the last face of that path is left, and the one through which it was entered
+    cost: Floats  # (e,) length of the shortest path to the midpoint of each edge so far
+    # (e,) halfedges by which that path leaves its last face, and by which it entered it
     leave: Ints
     enter: Ints
     queue: Queue  # of edges
     middles: Complexes  # (3m,) midpoint of each halfedge, in the layout of its face
-    tolls: Floats  # (e,) factor of the cost of paths to each edge, from 1 up; spread evenly, by the golden ratio
+    tolls: Floats  # (e,) factors slightly above 1, all different, by which costs to each edge are multiplied
 
     @classmethod
     def on(cls, triangles: IntrinsicMesh) -> Routes:
@@ -119,7 +122,10 @@ class Routes(NamedTuple):
 def path_through_vertices(
     triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints, name: str
 ) -> LocatedPoints:
-    """Find the path between two points that are connected only through vertices at which fans of faces touch."""
+    """Find a path between two points that are connected only through vertices at which fans of faces touch.
+
+    `start` and `end` are one point each. Returns the points between them. Raises `SourceError` if there is no path.
+    """
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [triangles.lengths_of_edges]
     for node, place in ((n, start), (n + 1, end)):
@@ -150,13 +156,17 @@ def path_through_vertices(
 
 
 TOLL_RANGE = 1e-9
-"""Relative range of extra costs of edges: of paths around a symmetric peak, whose lengths differ by 1e-16, the same one
-is then always found. Any number from 1e-12 to 1e-6 works."""
+"""Range of the relative extra costs of edges (`Routes.tolls`). Lengths of paths around a symmetric peak differ by
+1e-16, and with tolls the same path is always found. Any number from 1e-12 to 1e-6 works."""
 
 
 @compiled
 def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pair: int) -> tuple[Ints, Ints]:
-    """Return halfedges by which the shortest path through midpoints of edges leaves and enters faces; empty if none."""
+    """Find the sleeve of the shortest path through midpoints of edges between the two points of a pair.
+
+    Returns (k,) halfedges by which it leaves faces, and (k,) halfedges by which it enters the next; empty if there is
+    no path.
+    """
     cost, leave, enter, queue, middles, tolls = routes
     edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
@@ -206,9 +216,10 @@ def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pai
 
 @compiled
 def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Complexes]:
-    """Unfold a sleeve of k + 1 faces into the plane of its first face.
+    """Unfold a sleeve of k + 1 faces, with (k,) halfedges `left` and `entered`, into the plane of its first face.
 
-    Returns the ends of its portals (k, 2), which faces are turned over (k + 1,), and corners of the last one (3,).
+    Returns (k, 2) the ends of its portals, the edges between faces, (k + 1,) 1 for faces that are reversed and 0 for
+    others, and (3,) the corners of the last face.
     """
     portals, over = np.empty((len(left), 2), np.complex128), np.zeros(len(left) + 1, np.int64)
     placed = faces.positions[left[0] // 3].copy()
@@ -227,7 +238,10 @@ def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Co
 
 @compiled
 def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex, b: complex) -> complex:
-    """Return where a point of a face is if one of its sides is placed from a to b, and it is turned over if `over`."""
+    """Return the position of a point of a face after the face is moved so that one of its sides runs from a to b.
+
+    `corners` are its corners, (3,), and `over` is 1 if the face is reversed, else 0.
+    """
     base = corners[(side + 1) % 3] - corners[side]
     ratio = (point - corners[side]) / base if abs(base) > 0 else 0j
     return a + (np.conj(ratio) if over else ratio) * (b - a)
@@ -235,7 +249,11 @@ def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex
 
 @compiled
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
-    """Return the portals at which the shortest path in a sleeve bends, at which end (0: tail), and its length."""
+    """Find the shortest path in an unfolded sleeve between two points.
+
+    The portals and faces that are reversed are those of `unfold`. Returns the portals at which the path bends, for each
+    the end at which it does (0 for the tail, 1 for the head), and the length of the path.
+    """
     bends, ends = [0], [0]
     bends.pop()
     ends.pop()
@@ -244,12 +262,12 @@ def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tupl
     while i <= len(portals):
         for side in range(2):
             opposite, sign = 1 - side, 1.0 - 2.0 * side
-            place = portals[i, side ^ over[i]] if i < len(portals) else end
-            if sign * cross(rims[side] - apex, place - apex) < 0:
+            point = portals[i, side ^ over[i]] if i < len(portals) else end
+            if sign * cross(rims[side] - apex, point - apex) < 0:
                 continue
-            if apex == rims[side] or sign * cross(rims[opposite] - apex, place - apex) < 0:
+            if apex == rims[side] or sign * cross(rims[opposite] - apex, point - apex) < 0:
                 if i < len(portals):
-                    rims[side], rim_portals[side] = place, i
+                    rims[side], rim_portals[side] = point, i
                 continue
             i = rim_portals[opposite]
             bends.append(i)
@@ -266,15 +284,18 @@ def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tupl
 def other_way(
     faces: Faces, left: Ints, entered: Ints, portals: Complexes, bend: int, point: complex
 ) -> tuple[Ints, Ints]:
-    """Return the sleeve that passes the vertex of a bend on its other side; empty where no faces connect there."""
+    """Return the sleeve that passes the vertex at a bend on its other side, or empty arrays if no faces connect there.
+
+    `bend` is the portal at which the path bends, and `point` the position of the vertex.
+    """
     first = last = bend  # portals that end at the vertex
     while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
         first -= 1
     while last + 1 < len(left) and (portals[last + 1, 0] == point or portals[last + 1, 1] == point):
         last += 1
     goal, at_tail = entered[last] // 3, portals[first, 0] == point
-    # Walk around the vertex in all directions, breadth first. Known of each face reached are its two halfedges at the
-    # vertex, by which it is entered and left; whether the vertex is the tail of the second; and the face before it.
+    # Walk around the vertex in all directions, breadth first. Each face reached is stored with its two halfedges at the
+    # vertex, by which it is entered and left, whether the vertex is the tail of the second, and the face before it.
     way_out = preceding(left[first]) if at_tail else following(left[first])
     ways_in, ways_out, tail_there, before = [left[first]], [way_out], [not at_tail], [-1]
     k = 0
@@ -306,7 +327,7 @@ def other_way(
 
 @compiled
 def _point_in(places: Places, pair: int, face: int) -> complex:
-    """Return the position of the point of a pair in the layout of a face that contains it."""
+    """Return the position of point number `pair` in the layout of a face that contains it."""
     for s in range(places.first[pair], places.first[pair + 1]):
         if places.faces[s] == face:
             return places.points[s]
@@ -317,7 +338,7 @@ def _point_in(places: Places, pair: int, face: int) -> complex:
 def _path_in(
     faces: Faces, left: Ints, entered: Ints, starts: Places, ends: Places, pair: int
 ) -> tuple[Complexes, complex, complex, list[int], list[int], float]:
-    """Return the shortest path in a sleeve: its portals, its two ends, the bends as of `funnel`, and its length."""
+    """Unfold a sleeve, and return its portals, the two ends of the shortest path in it, and the result of `funnel`."""
     portals, over, placed = unfold(faces, left, entered)
     last = entered[-1] // 3
     begin, end = _point_in(starts, pair, left[0] // 3), _point_in(ends, pair, last)
@@ -330,7 +351,10 @@ def _path_in(
 def _straighten(
     faces: Faces, left: Ints, entered: Ints, starts: Places, ends: Places, pair: int
 ) -> tuple[Ints, Floats]:
-    """Return the halfedges that the shortest path crosses, and where, after trying the other side of each bend."""
+    """Shorten the path in a sleeve by passing the vertices of its bends on their other sides, where that helps.
+
+    Returns (k,) the halfedges that the path crosses, and (k,) the fractions of them at which it does.
+    """
     portals, begin, end, bends, bend_ends, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0
     while k < len(bends):
@@ -344,14 +368,14 @@ def _straighten(
             left, entered, k = try_left, try_entered, 0
             portals, begin, end, bends, bend_ends, length = path
     fractions = np.empty(len(left))
-    place, k = begin, 0
+    last_bend, k = begin, 0
     for i in range(len(left)):
         if k < len(bends) and bends[k] == i:
-            fractions[i], place = bend_ends[k], portals[i, bend_ends[k]]
+            fractions[i], last_bend = bend_ends[k], portals[i, bend_ends[k]]
             k += 1
             continue
-        next_place = portals[bends[k], bend_ends[k]] if k < len(bends) else end
-        along, span, away = next_place - place, portals[i, 1] - portals[i, 0], place - portals[i, 0]
+        next_bend = portals[bends[k], bend_ends[k]] if k < len(bends) else end
+        along, span, away = next_bend - last_bend, portals[i, 1] - portals[i, 0], last_bend - portals[i, 0]
         across = cross(along, span)
         share = (
             cross(along, away) / across if across != 0 else (np.conj(span) * away).real / max(abs(span) ** 2, 1e-300)
@@ -362,7 +386,11 @@ def _straighten(
 
 @compiled
 def _shortest_lines(faces: Faces, routes: Routes, starts: Places, ends: Places) -> tuple[Ints, Floats, Ints]:
-    """Return halfedges that shortest paths cross, fractions along them, and their number by pair, −1 if not joined."""
+    """Find shortest paths between p pairs of points, the i-th of `starts` and of `ends`.
+
+    Returns the halfedges that the paths cross, path after path, the fractions of them at which they do, and (p,) the
+    number of crossings on each path, −1 if none exists.
+    """
     counts = np.empty(len(starts.first) - 1, np.int64)
     sides, fractions = [0], [0.0]
     sides.pop()

@@ -1,7 +1,7 @@
 """Shortest paths on a polyhedral surface, traced back through the windows of an exact search for distances.
 
-The windows that have entered a face give the distance of each of its points, and the side by which the shortest path to
-it came. So a path is followed from its end, face by face, straight towards the source of the nearest window.
+The windows that have entered a face give the distance of each of its points, and the side through which the shortest
+path came. So a path is followed from its end, face by face, straight towards the source of the nearest window.
 """
 
 from __future__ import annotations
@@ -21,21 +21,21 @@ from .geodesic_sources import GeodesicSources, PlacedSegments
 from .shortest_paths import Places
 
 WINDOWS_AT_ONCE = 1 << 14
-"""Windows that are made until it is looked whether the end is reached."""
+"""Number of windows that are made between two checks whether the end is reached."""
 AT_END = 1e-9
-"""Fraction of an edge from its end up to which a path crosses it at the vertex."""
+"""Fraction of an edge, from its end, up to which a path that crosses the edge passes through the vertex instead."""
 
 
 class SourcesByFace(NamedTuple):
-    """The segments and points in faces, in order of these."""
+    """k segments and points of a source, sorted by face. A point is a segment of length 0."""
 
-    faces: Ints  # (k,)
-    starts: Complexes  # (k,) in the layout of the face
-    stops: Complexes
+    faces: Ints  # (k,) face of each, ascending
+    starts: Complexes  # (k,) start of each, in the layout of the face
+    stops: Complexes  # (k,) end of each
 
     @classmethod
     def of(cls, sources: GeodesicSources) -> SourcesByFace:
-        """Sort the sources of a search by face; points are segments without length."""
+        """Sort the segments and points of sources by face."""
         faces = np.concatenate([sources.beam_faces, sources.fan_faces])
         order = np.argsort(faces, kind="stable")
         starts = np.concatenate([sources.beam_starts, sources.fan_points])
@@ -44,7 +44,11 @@ class SourcesByFace(NamedTuple):
 
 
 def traced_path(triangles: IntrinsicMesh, placed: PlacedSegments, ends: LocatedPoints) -> LocatedPoints:
-    """Return the points of the shortest path from sources to the nearest of some ends, one on each edge it crosses."""
+    """Find the shortest path from sources to the nearest of some ends.
+
+    Returns its points in order, one on each edge that it crosses. The last is the end. Raises `SourceError` if no path
+    leads to an end.
+    """
     paused = PausedSearch.start(triangles, placed, 0.0)
     search, faces, places = paused.search, paused.faces, Places.of(triangles, ends)
     corners = triangles.corner_vertices[places.faces]
@@ -73,15 +77,15 @@ def traced_path(triangles: IntrinsicMesh, placed: PlacedSegments, ends: LocatedP
 def _trace(
     faces: Faces, search: Search, sources: SourcesByFace, places: Places, end: int
 ) -> tuple[float, Ints, Floats]:
-    """Follow the shortest path from an end to the sources.
+    """Follow the shortest path from an end, number `end` of `places`, back to the sources.
 
-    Returns its length, infinite if there is none, and the faces (k,) and barycentric coordinates (k, 3) of its points.
+    Returns its length, infinite if there is none, and for its points (k,) faces and (k, 3) barycentric coordinates.
     """
     at_faces = places.faces[places.first[end] : places.first[end + 1]].copy()
     at_points = places.points[places.first[end] : places.first[end + 1]].copy()
     edge, vertex = np.int64(-1), np.int64(-1)  # on which the last point lies
-    total, found, shares, steps = np.inf, [0], [0.0], len(faces.edges) + len(search.distance)
-    found.pop()
+    total, path_faces, shares, steps = np.inf, [0], [0.0], len(faces.edges) + len(search.distance)
+    path_faces.pop()
     shares.pop()
     while steps > 0:
         steps -= 1
@@ -112,14 +116,14 @@ def _trace(
                     if share < AT_END or share > 1.0 - AT_END:
                         kind, k = AT_VERTEX, (side + np.int64(share > 0.5)) % 3
         if vertex >= 0 and search.distance[vertex] <= best * (1.0 + 1e-13) and search.distance[vertex] == 0.0:
-            return total, np.array(found), np.array(shares).reshape(-1, 3)
+            return total, np.array(path_faces), np.array(shares).reshape(-1, 3)
         if kind == DONE:
-            return np.inf, np.array(found), np.array(shares).reshape(-1, 3)
+            return np.inf, np.array(path_faces), np.array(shares).reshape(-1, 3)
         if total == np.inf:
             total = best
         corners = faces.positions[face]
         whole = cross(corners[1] - corners[0], corners[2] - corners[0])
-        found.append(face)
+        path_faces.append(face)
         for c in range(3):
             if kind == AT_VERTEX:
                 shares.append(1.0 if c == k else 0.0)
@@ -129,7 +133,7 @@ def _trace(
                 a, b = corners[(c + 1) % 3] - place, corners[(c + 2) % 3] - place
                 shares.append(max(cross(a, b) / whole, 0.0))
         if kind == AT_SOURCE:
-            return total, np.array(found), np.array(shares).reshape(-1, 3)
+            return total, np.array(path_faces), np.array(shares).reshape(-1, 3)
         if kind == AT_VERTEX:
             edge, vertex = np.int64(-1), faces.vertices[face, k]
             around = faces.corners[faces.first_corner[vertex] : faces.first_corner[vertex + 1]]
@@ -146,16 +150,20 @@ def _trace(
                 f, side = halfedges[i] // 3, halfedges[i] % 3
                 a, b = faces.positions[f, side], faces.positions[f, (side + 1) % 3]
                 at_points[i] = a + (share if faces.forward[f, side] else 1.0 - share) * (b - a)
-    return np.inf, np.array(found), np.array(shares).reshape(-1, 3)
+    return np.inf, np.array(path_faces), np.array(shares).reshape(-1, 3)
 
 
 DONE, AT_SOURCE, AT_VERTEX, ACROSS = range(4)
-"""Kinds of steps of a path."""
+"""Kinds of steps of a path: there is none, or it leads to a source, to a vertex, or across a side."""
 
 
 @compiled
 def _through_side(faces: Faces, search: Search, halfedge: int, x: complex) -> tuple[float, float]:
-    """Return the distance of a point of a face through one of its sides, and the fraction of the side it crosses at."""
+    """Return the distance of a point x of a face through one of its sides, and the fraction of the side it crosses.
+
+    The side is the given halfedge, and x is in the layout of the face. The distance is infinite if no window has
+    entered the face there.
+    """
     face, side = halfedge // 3, halfedge % 3
     length = faces.lengths[faces.edges[face, side]]
     a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]

@@ -1,1 +1,1 @@
-"""Triangles and tets as plain arrays: edges, welding, components, cutting; intrinsic meshes; no domains."""
+"""Triangles and tets as plain arrays, and intrinsic meshes: edges, welding, components, intersections, cutting."""

@@ -1,8 +1,8 @@
-"""Division of triangles where others pass through them or lie in their planes, so that all meet in whole edges.
+"""Division of triangles that intersect others or lie in their planes, so that the pieces meet in whole edges.
 
 Faces meet in points: where an edge passes through a face, where two edges touch, and where three faces cross. Points
-closer than rounding are merged, and pieces are made from these points alone, so that they share whole edges, whatever
-rounding does, and what was closed stays closed. The time grows with the number of these points.
+closer than rounding are merged, and the faces are divided between these points alone. So neighbouring pieces share
+whole edges, whatever rounding does, and a closed mesh stays closed. The time grows with the number of these points.
 """
 
 from __future__ import annotations
@@ -22,25 +22,26 @@ from .triangles import face_areas, heights
 from .welding import distinct_rows, tolerances, welded_within
 
 SAME_POINT = 1e-8
-"""Distance below which points are one, since coordinates are rounded, relative to the size of the parts that meet."""
+"""Distance below which points are merged, relative to the size of the parts that meet. It allows for rounding."""
 ON_LINE = 4.0
-"""Distance from a line within which the common points of two faces count as lying on it, in multiples of the distance
-below which points are one."""
+"""Distance from a line up to which the common points of two faces count as lying on it, in multiples of the distance
+below which points are merged. Farther away, the faces lie in one plane."""
 PARALLEL_EDGES = 1e-9
-"""Sine of the angle between edges below which they are parallel."""
+"""Sine of the angle between edges below which they count as parallel, and do not cross."""
 COVERING_CELLS = 1e-4
 """Relative difference in area and centroid up to which cells with the same outline count as covering each other."""
 ON_EDGE, IN_FACE, TWO_EDGES, EDGE_AND_FACE = range(4)
-"""Kinds of meetings: a vertex lies on an edge or in a face, two edges touch, or an edge passes through a face."""
+"""Kinds of meetings of two faces: a vertex of one lies on an edge of the other, or in it, an edge of one touches an
+edge of the other, or passes through it."""
 
 
 class Arrangement(NamedTuple):
-    """Pieces of faces that meet in whole edges."""
+    """p triangles, the pieces of given faces, which meet in whole edges."""
 
-    points: Floats  # (n, 3) the given points, followed by those where faces meet
+    points: Floats  # (n, 3) the given points, followed by the points in which faces meet
     faces: Ints  # (p, 3) pieces, in order of the faces
-    origins: Ints  # (p,) the face that each is a piece of, ascending
-    cells: Ints  # (p,) the cell of each piece: pieces of a face that no line separates are in one cell
+    origins: Ints  # (p,) the face of which each is a piece, ascending
+    cells: Ints  # (p,) cell of each piece: pieces of a face are in one cell unless an intersection separates them
 
 
 class Incidence(NamedTuple):
@@ -51,7 +52,7 @@ class Incidence(NamedTuple):
 
     @classmethod
     def of(cls, *pairs: tuple[Ints, Ints]) -> Incidence:
-        """Merge several lists of pairs."""
+        """Merge several lists of pairs, each given by two arrays of owners and points."""
         owners, points = (np.concatenate(column).astype(np.int64) for column in zip(*pairs, strict=True))
         order = np.lexsort((points, owners))
         owners, points = owners[order], points[order]
@@ -59,21 +60,21 @@ class Incidence(NamedTuple):
         return cls(owners[new], points[new])
 
     def starts(self, n: int) -> Ints:
-        """Return (n + 1,) where the points of each of n owners begin."""
+        """Return (n + 1,) offsets: the pairs of owner i are those from starts[i] to starts[i + 1]."""
         return np.searchsorted(self.owners, np.arange(n + 1))
 
     def without(self, *others: tuple[Ints, Ints]) -> Incidence:
-        """Return the pairs that are in none of several lists."""
+        """Return the pairs that are in none of several lists of owners and points."""
         owners, points = (np.concatenate(column) for column in zip(*others, strict=True))
         shift = 1 + max(int(self.points.max(initial=0)), int(points.max(initial=0)))
         return self.select(~np.isin(self.owners * shift + self.points, owners * shift + points))
 
     def select(self, chosen: Bools) -> Incidence:
-        """Return the chosen pairs."""
+        """Return the pairs for which a boolean array is true."""
         return Incidence(self.owners[chosen], self.points[chosen])
 
     def along(self, points: Floats, ends: Ints) -> Incidence:
-        """Return the points of each line in order from its first end to the other."""
+        """Sort the points of each line from its first end to its second; `ends` are the ends of lines, (l, 2)."""
         tails, heads = points[ends[self.owners, 0]], points[ends[self.owners, 1]]
         ahead = ((points[self.points] - tails) * (heads - tails)).sum(axis=1)
         order = np.lexsort((ahead, self.owners))
@@ -81,14 +82,18 @@ class Incidence(NamedTuple):
 
 
 def meeting_faces(points: Floats, faces: Ints, slacks: Floats | None = None) -> Ints:
-    """Return (k, 2) pairs of faces that cross, cover each other in one plane, or touch without a common vertex."""
+    """Return (k, 2) pairs of faces that cross, overlap in one plane, or touch without a common vertex.
+
+    `slacks`, (m,), are the distances at which each face counts as touching others, by default those of rounding.
+    """
     return overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT) if slacks is None else slacks)
 
 
 def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Floats | None = None) -> Arrangement:
-    """Divide faces where pairs of them, (k, 2), by default all, meet, and where unbalanced edges end on others.
+    """Divide (m, 3) faces where they meet, and unbalanced edges where others of them end.
 
-    Points are merged if closer than the slacks, (m,), of the faces that they lie on; thinner triangles are dropped.
+    `pairs`, (k, 2), are the faces that may meet, by default all. Points are merged if they are closer than the
+    `slacks`, (m,), of the faces on which they lie. Triangles thinner than their slack are dropped.
     """
     slacks = tolerances(points, faces, SAME_POINT) if slacks is None else slacks
     pairs = meeting_faces(points, faces, slacks) if pairs is None else pairs
@@ -104,18 +109,18 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
     table = edge_table(faces)
     on_open = _on_open_edges(points, table, reaches)
 
-    meetings, places, meeting = _meet(
+    meetings, positions, meeting_slacks = _meetings(
         np.ascontiguousarray(points), faces, table.vertices, table.face_edges, pairs, slacks
     )
-    kinds, owners, others = meetings.T
+    kinds, first, second = meetings.T
     new = kinds >= TWO_EDGES
-    points, reaches, ids = _with_new(points, reaches, meetings, places, meeting, new, others)
+    points, reaches, ids = _with_new(points, reaches, meetings, positions, meeting_slacks, new, second)
     on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == TWO_EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
     along = on_edge | edges | pierced
     lines = Lines(
         table.vertices,
-        Incidence.of(on_open, (owners[along], ids[along]), (others[edges], ids[edges])),
-        Incidence.of((owners[in_face], ids[in_face]), (others[pierced], ids[pierced])),
+        Incidence.of(on_open, (first[along], ids[along]), (second[edges], ids[edges])),
+        Incidence.of((first[in_face], ids[in_face]), (second[pierced], ids[pierced])),
     )
     lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), reaches))
     lines, records = _with_segments(points, faces, table, pairs, lines, slacks)
@@ -124,7 +129,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
 
 
 def _reaches(n: int, faces: Ints, slacks: Floats) -> Floats:
-    """Return (n,) the least slack of the faces at each point."""
+    """Return (n,) the least slack of the faces at each point, infinity at points without a face."""
     reaches = np.full(n, np.inf)
     for corners in faces.T:
         np.minimum.at(reaches, corners, slacks)
@@ -132,7 +137,7 @@ def _reaches(n: int, faces: Ints, slacks: Floats) -> Floats:
 
 
 class Lines(NamedTuple):
-    """Edges of faces, followed by the segments along which two faces meet."""
+    """l lines: the edges of all faces, followed by the s segments along which two faces meet."""
 
     ends: Ints  # (l, 2) points at which each line begins and ends
     on: Incidence  # points on lines, without their ends
@@ -140,7 +145,7 @@ class Lines(NamedTuple):
     sides: Ints = np.zeros((0, 2), dtype=np.int64)  # (s, 2) the two faces of each segment
 
     def renamed(self, rename: Ints) -> Lines:
-        """Replace each point by the one that it was merged into, `rename` (n,)."""
+        """Replace each point by the one into which it was merged, which `rename`, (n,), contains."""
         ends = rename[self.ends]
         on = Incidence.of((self.on.owners, rename[self.on.points]))
         on = on.select((on.points[:, None] != ends[on.owners]).all(axis=1))
@@ -148,7 +153,11 @@ class Lines(NamedTuple):
 
 
 def _welded(points: Floats, chosen: Ints, reaches: Floats) -> Ints:
-    """Return (n,) the point that each is merged into: of chosen points the first one at its place, else itself."""
+    """Return (n,) the point into which each is merged.
+
+    Points whose ids are `chosen` are merged into the first of them within their `reaches`, (n,); others stay as they
+    are.
+    """
     rename = np.arange(len(points))
     chosen = np.unique(chosen)
     rename[chosen] = chosen[welded_within(points[chosen], reaches[chosen])]
@@ -156,17 +165,24 @@ def _welded(points: Floats, chosen: Ints, reaches: Floats) -> Ints:
 
 
 def _with_new(
-    points: Floats, reaches: Floats, names: Ints, places: Floats, slacks: Floats, new: Bools, ids: Ints
+    points: Floats, reaches: Floats, names: Ints, positions: Floats, slacks: Floats, new: Bools, ids: Ints
 ) -> tuple[Floats, Floats, Ints]:
-    """Append a point, and its reach, for each distinct `new` row of `names`; and return `ids` with the new numbers."""
+    """Append points in which faces meet; return all points, their reaches, and the point of each meeting.
+
+    Row k of `names`, `positions` and `slacks` describes a meeting. Where ``new[k]`` is true, a point is appended, once
+    for meetings with the same name. Elsewhere ``ids[k]`` is the id of a given point.
+    """
     numbers, first = distinct_rows(names[new])
     ids = ids.copy()
     ids[new] = len(points) + numbers
-    return np.concatenate([points, places[new][first]]), np.concatenate([reaches, slacks[new][first]]), ids
+    return np.concatenate([points, positions[new][first]]), np.concatenate([reaches, slacks[new][first]]), ids
 
 
 def _on_open_edges(points: Floats, table: EdgeTable, reaches: Floats) -> tuple[Ints, Ints]:
-    """Return pairs of an unbalanced edge and a vertex that lies on it and is an end of another unbalanced edge."""
+    """Return (k,) unbalanced edges, and (k,) vertices on them that are ends of other unbalanced edges.
+
+    An edge is unbalanced if not as many faces run along it in one direction as in the other.
+    """
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
         return edges, edges
@@ -185,13 +201,13 @@ def _on_open_edges(points: Floats, table: EdgeTable, reaches: Floats) -> tuple[I
 
 
 def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incidence:
-    """Return all points of chosen faces: corners, points on edges and points inside."""
+    """Return all points of the faces with ids `chosen`, which are corners, points on edges, and points inside."""
     sides, points = members_of(lines.on.starts(len(lines.ends)), lines.on.points, table.face_edges[chosen].ravel())
     return Incidence.of((np.repeat(chosen, 3), faces[chosen].ravel()), (chosen[sides // 3], points), lines.within)
 
 
 class Records(NamedTuple):
-    """Parts of lines that lie in faces: (r,) face, line, and the two points at which each begins and ends."""
+    """Parts of lines that lie in faces: (r,) ids of the face, of the line, and of the points at both ends."""
 
     faces: Ints
     lines: Ints
@@ -202,7 +218,7 @@ class Records(NamedTuple):
 def _with_segments(
     points: Floats, faces: Ints, table: EdgeTable, pairs: Ints, lines: Lines, slacks: Floats
 ) -> tuple[Lines, Records]:
-    """Add the segments along which pairs of faces meet, from the points that they have in common."""
+    """Add the segments along which pairs of faces meet, found from the points that both faces have in common."""
     members = _members(faces, table, lines, np.unique(pairs))
     chains = Chains(lines.ends, lines.on.starts(len(lines.ends)), lines.on.points)
     starts = members.starts(len(faces))
@@ -216,7 +232,7 @@ def _with_segments(
 def _with_crossings(
     points: Floats, lines: Lines, records: Records, reaches: Floats, slacks: Floats, busy: Ints
 ) -> tuple[Floats, Lines, Records]:
-    """Add the points where lines meet within faces."""
+    """Add the points in which lines cross or touch within faces."""
     if not len(records.faces):
         return points, lines, records
     ends = np.stack([records.tails, records.heads], axis=1)
@@ -245,7 +261,7 @@ def _with_crossings(
 def _divided(
     points: Floats, faces: Ints, origins: Ints, table: EdgeTable, lines: Lines, records: Records
 ) -> Arrangement:
-    """Triangulate all faces that have points on their edges, or points or lines inside; the others stay whole."""
+    """Triangulate all faces that have points on their edges, or points or lines inside; others stay undivided."""
     n_lines = len(lines.ends)
     on = lines.on.along(points, lines.ends)
     counts = np.bincount(on.owners, minlength=n_lines)
@@ -328,7 +344,10 @@ def _divided(
 
 
 def _with_copies_alike(pieces: Arrangement) -> Arrangement:
-    """Give all cells that cover each other the triangles of the first one, reversed where they face the other way."""
+    """Give cells of different faces that cover each other the same triangles, those of the first cell.
+
+    Triangles are reversed where a face has the opposite orientation.
+    """
     points, faces, origins, cells = pieces
     table = edge_table(faces)
     n = int(cells.max(initial=-1)) + 1
@@ -370,7 +389,7 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
 
 @compiled
 def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
-    """Return whether a point lies on an edge, between its ends."""
+    """Return whether point v lies between the ends of edge ab, and at most `slack` from it."""
     square, ahead = 0.0, 0.0
     for d in range(3):
         way = points[b, d] - points[a, d]
@@ -385,8 +404,11 @@ def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
 
 
 @compiled
-def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> float:
-    """Return the distance at which edges ab and cd pass each other, and write the middle; infinity if they do not."""
+def _closest(points: Floats, a: int, b: int, c: int, d: int, middle: Floats) -> float:
+    """Return the distance of edges ab and cd where they pass each other, and write the point in the middle, (3,).
+
+    The distance is infinite if the edges are parallel, or nearest to each other at an end.
+    """
     u, v, w = points[b] - points[a], points[d] - points[c], points[c] - points[a]
     n, square, s, t = np.empty(3), 0.0, 0.0, 0.0
     for k in range(3):
@@ -405,7 +427,7 @@ def _closest(points: Floats, a: int, b: int, c: int, d: int, place: Floats) -> f
     for k in range(3):
         x, y = points[a, k] + s * u[k], points[c, k] + t * v[k]
         off += (x - y) ** 2
-        place[k] = 0.5 * (x + y)
+        middle[k] = 0.5 * (x + y)
     return np.sqrt(off)
 
 
@@ -420,7 +442,7 @@ def _normal(points: Floats, face: Ints) -> tuple[float, float, float]:
 
 @compiled
 def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
-    """Return whether a place lies over a face, within its edges."""
+    """Return whether the projection of a position x on a face, along its normal n, is inside the face."""
     for k in range(3):
         a, b = face[k], face[(k + 1) % 3]
         turn = 0.0
@@ -436,10 +458,15 @@ def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
 
 
 @compiled
-def _meet(
+def _meetings(
     points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slacks: Floats
 ) -> tuple[Ints, Floats, Floats]:
-    """Return (e, 3) meetings of faces, as kind and the two elements that meet, (e, 3) new points, and (e,) slacks."""
+    """Find the points in which pairs of faces, (k, 2), meet.
+
+    Returns (e, 3) meetings, (e, 3) their positions, which are zero where the point is a vertex, and (e,) their slacks.
+    A meeting is a row of its kind and the ids of two elements: ON_EDGE, edge and vertex; IN_FACE, face and vertex;
+    TWO_EDGES and both edges, the smaller id first; EDGE_AND_FACE, edge and face.
+    """
     meetings, places, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]
     touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
     on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
@@ -503,17 +530,17 @@ def _meet(
 
 
 class Chains(NamedTuple):
-    """Lines with the points on them."""
+    """l lines with the ids of the points on them."""
 
-    ends: Ints  # (l, 2)
-    # (l + 1,) where the points of each line begin in `points`, and these points, for each line in ascending order
+    ends: Ints  # (l, 2) points at both ends
+    # (l + 1,) offsets of the points on each line in `points`, and these, for each line in ascending order
     starts: Ints
     points: Ints
 
 
 @compiled
 def _shared_edge(face_edges: Ints, chains: Chains, f: int, a: int, b: int) -> int:
-    """Return the edge of a face that two points lie on, or −1."""
+    """Return the edge of face f on which both points a and b lie, or −1."""
     for k in range(3):
         e = face_edges[f, k]
         if _is_along(chains, e, a) and _is_along(chains, e, b):
@@ -523,7 +550,7 @@ def _shared_edge(face_edges: Ints, chains: Chains, f: int, a: int, b: int) -> in
 
 @compiled
 def _is_along(chains: Chains, line: int, p: int) -> bool:
-    """Return whether a point is an end of a line or lies on it."""
+    """Return whether point p is an end of a line or one of the points on it."""
     if p == chains.ends[line, 0] or p == chains.ends[line, 1]:
         return True
     on_line = chains.points[chains.starts[line] : chains.starts[line + 1]]
@@ -535,7 +562,13 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
 def _segments(
     points: Floats, starts: Ints, members: Ints, face_edges: Ints, chains: Chains, pairs: Ints, straight: Floats
 ) -> tuple[Ints, Ints]:
-    """Return (r, 4) parts of lines in faces, as rows of face, line and two ends, and (s, 2) the faces of new lines."""
+    """Find the lines along which pairs of faces, (k, 2), meet, from the points that both faces have in common.
+
+    Points of face f are ``members[starts[f] : starts[f + 1]]``, ascending. If the common points of two faces are within
+    `straight`, (m,), of a line, the faces meet along that line. Otherwise they lie in one plane, and meet along the
+    edges of one that lie in the other. Returns (r, 4) parts of lines in faces, as rows of face, line and two ends, and
+    (s, 2) the two faces of each line that is no edge.
+    """
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
     ends = chains.ends
     for r in range(len(pairs)):
@@ -612,7 +645,12 @@ def _segments(
 def _cross(
     points: Floats, faces: Ints, lines: Ints, ends: Ints, starts: Ints, near: Ints, slacks: Floats
 ) -> tuple[Ints, Ints, Floats]:
-    """Return (t, 2) pairs of a line and a point on it, (c, 2) pairs of parts that cross within a face, and where."""
+    """Find where parts of lines touch or cross each other within a face.
+
+    The arrays `faces`, `lines` and `ends` are those of `Records`, and ``near[starts[r] : starts[r + 1]]`` are the parts
+    that may meet part r. Returns (t, 2) pairs of a line and a point on it, (c, 2) pairs of parts that cross, and (c, 3)
+    positions of the crossings.
+    """
     touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
     place = np.empty(3)
     for r in range(len(faces)):

@@ -12,7 +12,7 @@ from ..arrays import Floats, Ints
 from ..compiled import compiled
 
 BOXES_PER_LEAF = 4
-"""Boxes in each leaf."""
+"""Number of boxes in each leaf of a tree."""
 SPREAD_BITS = (
     (32, 0x1F00000000FFFF),
     (16, 0x1F0000FF0000FF),
@@ -26,9 +26,9 @@ SPREAD_BITS = (
 class BoxTree(NamedTuple):
     """A complete binary tree over boxes in Morton order: node i has the children 2i and 2i + 1, the root is 1."""
 
-    # (2 · leaves, 6) lower and upper corner of the box around all below each node; lower > upper for an empty node
+    # (2 · leaves, 6) lower and upper corner of the box around all boxes below each node; lower > upper if there is none
     bounds: Floats
-    items: Ints  # (leaves · BOXES_PER_LEAF,) the boxes in each leaf, −1 where there are none
+    items: Ints  # (leaves · BOXES_PER_LEAF,) ids of the boxes in each leaf; −1 in places that are not used
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> BoxTree:
@@ -42,7 +42,7 @@ class BoxTree(NamedTuple):
 
     @classmethod
     def in_order(cls, lower: Floats, upper: Floats, order: Ints) -> BoxTree:
-        """Build the tree over boxes in an order that keeps neighbours together."""
+        """Build the tree over boxes with (n, 3) corners; neighbours in the `order`, (n,), should be close in space."""
         n = len(lower)
         leaves = 1 << max(int(np.ceil(np.log2(max(n, 1) / BOXES_PER_LEAF))), 0)
         items = np.full(leaves * BOXES_PER_LEAF, -1, dtype=np.int64)
@@ -61,9 +61,10 @@ class BoxTree(NamedTuple):
         return cls(bounds, items)
 
     def meeting(self, triangles: Floats, slack: float | Floats = 0.0) -> tuple[Ints, Ints]:
-        """Find boxes within `slack` of (n, 3, 3) triangles: (n + 1,) where those of each begin, and (k,) the boxes.
+        """Find the boxes that may be within `slack` of each of (n, 3, 3) triangles.
 
-        The slack is one number, or (n,) one for each triangle.
+        Returns (n + 1,) offsets and (k,) ids of boxes: those of triangle i are the ids from starts[i] to starts[i + 1].
+        The slack is a number, or one for each triangle, (n,).
         """
         corners, slacks = np.ascontiguousarray(triangles).reshape(-1, 9), np.full(len(triangles), slack)
         starts, room = np.zeros(len(corners) + 1, dtype=np.int64), 64 * len(corners)  # faces of a mesh have about 40
@@ -77,7 +78,7 @@ class BoxTree(NamedTuple):
 
 @compiled
 def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, starts: Ints, out: Ints) -> None:
-    """Write the boxes near each triangle into `out`, as far as there is room, and where they begin into `starts`."""
+    """Write the ids of the boxes near each triangle into `out`, as far as there is room, and offsets into `starts`."""
     bounds, items = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
     lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
@@ -134,19 +135,25 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, starts: Ints, out: 
 
 
 def boxes_around(corners: Floats) -> tuple[Floats, Floats]:
-    """Return (n, 3) lower and upper corners of the boxes around (n, k, 3) corners: NumPy is slow along short axes."""
+    """Return (n, 3) lower and (n, 3) upper corners of the boxes around (n, k, 3) corners.
+
+    This is faster than NumPy's `min` and `max` along a short axis.
+    """
     columns = corners.swapaxes(0, 1)
     return reduce(np.minimum, columns), reduce(np.maximum, columns)
 
 
 def room_around(bounds: ArrayLike, reach: float = 0.0, share: float = 0.2) -> float:
-    """Return the padding of a box: a share of its longest side for its completion, and room for offsets to `reach`."""
+    """Return a padding for the box of a shape, (2, d) corners.
+
+    It is a `share` of the longest side, for the completion of the shape, plus room for offsets up to `reach`.
+    """
     lower, upper = np.asarray(bounds, dtype=np.float64)
     return share * float((upper - lower).max()) + 1.05 * reach
 
 
 def order_in_space(points: Floats) -> Ints:
-    """Return the order of (n, 3) points along a space-filling curve; few points stay as they are."""
+    """Return (n,) indices that sort (n, 3) points along a space-filling curve; fewer than 64 keep their order."""
     if len(points) < 64:  # sorting them would take as long as searching for some
         return np.arange(len(points))
     return np.argsort(morton_codes(points), kind="stable")

@@ -1,4 +1,8 @@
-"""Connected components of graphs and of elements; members of groups, one group after another in one array."""
+"""Connected components of graphs and of elements, and groups of members.
+
+Groups are stored as (n + 1,) offsets `starts` and an array of members: group i is ``members[starts[i] : starts[i +
+1]]``.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +14,25 @@ from ..compiled import compiled
 
 
 def connected_components(n: int, tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
-    """Return (n,) the component of each node of a graph with edges tails to heads, numbered by first appearance."""
+    """Return (n,) the connected component of each of n nodes; edge k of the graph joins tails[k] and heads[k].
+
+    Components are numbered from 0, in order of their least node.
+    """
     return _component_numbers(n, *(read_only(np.ascontiguousarray(ends, dtype=np.int64)) for ends in (tails, heads)))
 
 
 def element_components(elements: Ints) -> Ints:
-    """Return (m,) the component of each of (m, k) elements, connected by common ids, numbered by first appearance."""
+    """Return (m,) the connected component of each of (m, k) elements, which are connected if they share an id.
+
+    Components are numbered from 0, in order of their first element.
+    """
     links = np.repeat(elements[:, 0], elements.shape[1] - 1), elements[:, 1:].ravel()
     labels = connected_components(int(elements.max(initial=-1)) + 1, *links)[elements[:, 0]]
     return by_first_use(labels, int(labels.max(initial=-1)) + 1)[0]
 
 
 def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
-    """Renumber ids below n in order of first appearance; return the new numbers, and the old id of each."""
+    """Renumber ids below n from 0 in order of first appearance; return the new ids, and the old id of each new one."""
     first = first_members(ids, n)
     used = np.flatnonzero(first >= 0)
     order = used[np.argsort(first[used])]
@@ -33,10 +43,7 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 
 @compiled
 def _component_numbers(n: int, tails: Ints, heads: Ints) -> Ints:
-    """Return for each of n nodes the number of its connected component (n,), from 0 on, in order of its least node.
-
-    Edge k joins nodes `tails[k]` and `heads[k]`. This is union-find: trees have their least node as root.
-    """
+    """Do the work of `connected_components` by union-find, with the least node of each tree as its root."""
     parents = np.arange(n)
     for k in range(len(tails)):
         a, b = tails[k], heads[k]
@@ -58,20 +65,20 @@ def _component_numbers(n: int, tails: Ints, heads: Ints) -> Ints:
 
 
 def grouped(groups: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
-    """Return (n + 1,) where the members of each of n groups begin, and the members, indices into `groups`, in order."""
+    """Sort the indices of `groups`, (k,) group ids below n, by group; return (n + 1,) offsets and (k,) indices."""
     starts, members = _grouped(read_only(np.ascontiguousarray(groups, dtype=np.int64)), n)
     return starts, members
 
 
 def first_members(groups: NDArray[np.integer], n: int) -> Ints:
-    """Return (n,) the first member of each of n groups, −1 where there is none."""
+    """Return (n,) the first index at which each id below n occurs in `groups`, −1 if it does not."""
     first = np.full(n, -1)
     first[groups[::-1]] = np.arange(len(groups))[::-1]
     return first
 
 
 def places_among(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> Ints:
-    """Return (k,) the place of each key among ordered ones, −1 where it is none of them."""
+    """Return (k,) the index of each key in a sorted array, −1 if it is not in it."""
     if not len(ordered):
         return np.full(len(keys), -1)
     places = np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)
@@ -79,26 +86,26 @@ def places_among(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> Int
 
 
 def numbered(counts: Ints) -> tuple[Ints, Ints]:
-    """Return the group of each member of groups of given sizes, and the number of each member within its group."""
+    """Return the group of each member of consecutive groups with given sizes, and its number within the group."""
     owners = np.repeat(np.arange(len(counts)), counts)
     return owners, np.arange(len(owners)) - (np.cumsum(counts) - counts)[owners]
 
 
 def next_in_groups(starts: Ints) -> Ints:
-    """Return (k,) the place of the member after each in its group, cyclically, given (n + 1,) where groups begin."""
+    """Return (k,) the index of the next member of the same group, cyclically, for groups with (n + 1,) offsets."""
     following, filled = np.arange(1, starts[-1] + 1), starts[1:] > starts[:-1]
     following[starts[1:][filled] - 1] = starts[:-1][filled]
     return following
 
 
 def members_of(starts: Ints, members: Ints, chosen: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Return all members of the chosen groups, as pairs: index into `chosen`, and member."""
+    """Return the members of chosen groups: the index in `chosen` of the group of each member, and the member."""
     owners, number = numbered(starts[chosen + 1] - starts[chosen])
     return owners, members[starts[chosen][owners] + number]
 
 
 def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -> Floats:
-    """Return (n, ...) sums of the rows of (k, ...) values in each of n groups."""
+    """Return (n, ...) sums of (k, ...) values over each of n groups; row i is in group groups[i]."""
     columns = values.reshape(len(values), int(np.prod(values.shape[1:]))).T
     sums = np.stack([np.bincount(groups, column, n) for column in columns], axis=1)
     return np.asarray(sums.reshape(n, *values.shape[1:]), np.float64)

@@ -1,6 +1,6 @@
-"""Conforming refinement: cut triangles so that curves run along edges and points lie at vertices.
+"""Conforming refinement of intrinsic meshes, which cuts triangles so that curves run along edges.
 
-Each triangle gets a constrained triangulation of its own, with the points inside it and the segments as edges.
+Each triangle that is cut gets a constrained triangulation, with points inside it as vertices and segments as edges.
 """
 
 from __future__ import annotations
@@ -29,13 +29,16 @@ Point = tuple[float, float]
 Edge = tuple[int, int]
 
 CORNERS: tuple[Point, Point, Point] = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
-"""Corners of a face in the coordinates in which it is cut."""
+"""Corners of a face in the coordinates in which it is triangulated."""
 
 
 def refine_to_conform(
     triangles: IntrinsicMesh, groups: Sequence[Sequence[CurveSegments]]
 ) -> tuple[IntrinsicMesh, list[list[CurveSegments]]]:
-    """Cut faces that unoriented curves cross; points in cut faces become vertices. Return mesh and sources."""
+    """Cut the faces that unoriented curves cross, along these; return the mesh, and groups of sources on it.
+
+    Points of all sources that lie in these faces become vertices.
+    """
     parts = [part for group in groups for part in group]
     if all(part.is_conforming for part in parts):
         return triangles, [list(group) for group in groups]
@@ -51,9 +54,11 @@ def cut_along(
     unfit: Sequence[bool] | None = None,
     begin: Ints | None = None,
 ) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-    """Cut faces so that sources run along edges; return triangles, sources, which faces are new, and their parents.
+    """Cut faces so that sources run along edges.
 
-    Only `unfit` sources (by default all) must; others do in faces that are cut. Face f begins at corner `begin[f]`.
+    Returns the mesh, the sources on it, (m,) whether each of its faces is new, and (m,) the face of which each is a
+    part. Faces are cut along the sources for which `unfit` is true, by default all, and then along all others in them.
+    The triangulation of face f begins at its corner ``begin[f]``.
     """
     merged = MergedSources.of(parts)
     faces, edges = affected_elements(triangles, merged, [True] * len(parts) if unfit is None else unfit)
@@ -64,7 +69,10 @@ def cut_along(
 
 
 def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Sequence[bool]) -> tuple[Ints, Ints]:
-    """Return the faces to cut and the edges to split: those of `unfit` sources, and all that must then follow."""
+    """Return the faces to cut and the edges to split for sources that are `unfit`.
+
+    A face with a split edge is cut, too. A cut face splits the edges on which segments in it end.
+    """
     nodes, inside, m = merged.nodes, merged.edges < 0, triangles.n_faces
     last = m + triangles.n_edges
     face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()
@@ -133,16 +141,16 @@ class FaceCutter:
         return self.n_edges - 1
 
     def node(self, vertex: int) -> int:
-        """Return the node at a vertex, a new one if it had none."""
+        """Return the node of the sources at a vertex; a new one if there is none."""
         if vertex not in self.node_at:
             self.node_at[vertex] = len(self.vertex_of)
             self.vertex_of.append(vertex)
         return self.node_at[vertex]
 
     def cut_along(self, p: int, edge: int) -> None:
-        """Replace segment p, which runs along a split edge, by a segment between each two successive vertices."""
-        merged, (vertices, fractions, place) = self.merged, self.along_edge(edge)
-        a, b = (place[self.vertex_of[i]] for i in merged.ends[p].tolist())
+        """Replace segment p, which runs along a split edge, by segments between successive vertices on the edge."""
+        merged, (vertices, fractions, index) = self.merged, self.along_edge(edge)
+        a, b = (index[self.vertex_of[i]] for i in merged.ends[p].tolist())
         step = 1 if a < b else -1
         for k in range(a, b, step):
             vector = merged.vectors[p] * (abs(fractions[k + step] - fractions[k]) / abs(fractions[b] - fractions[a]))
@@ -151,7 +159,7 @@ class FaceCutter:
             self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
 
     def along_edge(self, edge: int) -> tuple[list[int], list[float], dict[int, int]]:
-        """Return the vertices along a split edge, the fraction of it at each, and the index of each in this list."""
+        """Return the vertices along a split edge, the fraction of the edge at each, and the index of each vertex."""
         if edge not in self.chains:
             chain = self.on_edge[edge]
             tail, head = self.triangles.edges.vertices[edge].tolist()
@@ -161,7 +169,7 @@ class FaceCutter:
         return self.chains[edge]
 
     def cut_face(self, face: int, inside: list[int]) -> None:
-        """Cut one face along the segments inside it."""
+        """Cut a face along the segments inside it, whose numbers are given."""
         around = ((self.begin[face] + np.arange(3)) % 3).tolist()
         outline = self.outline(face, around)
         points, vertices = outline.points, outline.vertices
@@ -192,7 +200,7 @@ class FaceCutter:
             self.add_pieces(p, with_middles(way.tolist(), middles), outline, positions)
 
     def outline(self, face: int, around: list[int]) -> Outline:
-        """Return a face with the nodes on its sides; `around` lists its corners from the first on."""
+        """Return the outline of a face with the nodes on its sides; `around` lists its corners 0, 1, 2 in order."""
         triangles, along = self.triangles, self.merged.nodes.along
         result = Outline()
         for k, side in enumerate(around):
@@ -214,7 +222,7 @@ class FaceCutter:
         return result
 
     def add_faces(self, face: int, triangles: Ints, outline: Outline, positions: Complexes) -> None:
-        """Add the triangles of a face, and the edges within it, which are numbered as they appear."""
+        """Add the triangles of a face, (k, 3) indices of points of its outline, and the new edges between them."""
         for corners in triangles.tolist():
             sides = list(pairwise([*corners, corners[0]]))
             for u, v in sides:
@@ -227,7 +235,7 @@ class FaceCutter:
             self.faces.append(NewFace(face, vertices, edges, ahead, positions[corners]))
 
     def add_pieces(self, p: int, chain: list[int], outline: Outline, positions: Complexes) -> None:
-        """Add the parts of segment p, between the points of a chain, with its normal in the frames of their edges."""
+        """Add the parts of segment p between successive points of a chain, with normals in the frames of the edges."""
         whole = abs(positions[chain[-1]] - positions[chain[0]])
         for u, v in pairwise(chain):
             edge, _ = outline.edge_of.get((u, v)) or outline.edge_of[v, u]
@@ -239,7 +247,7 @@ class FaceCutter:
             self.pieces.append(NewSegment(*ends, -1, edge, vector, self.merged.owners[p]))
 
     def assemble(self) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-        """Put the cut mesh and its sources together; see `cut_along` for what is returned."""
+        """Put the cut mesh and its sources together; the result is that of the function `cut_along`."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)
@@ -289,27 +297,27 @@ class FaceCutter:
 class Outline:
     """A face and the nodes on its sides, in coordinates in which its corners are (0, 0), (1, 0) and (0, 1)."""
 
-    points: list[Point] = field(default_factory=list)  # those on its sides in order, from its first corner on
+    points: list[Point] = field(default_factory=list)  # points on the sides, in order from the first corner on
     vertices: list[int] = field(default_factory=list)  # the vertex at each point
-    corners: list[int] = field(default_factory=list)  # the points at its second and third corner, and their number
-    # the edge between two points, and whether it runs from the first to the second
+    corners: list[int] = field(default_factory=list)  # indices of the second and the third corner; number of points
+    # by two points, the edge between them, and whether it runs from the first to the second
     edge_of: dict[Edge, tuple[int, bool]] = field(default_factory=dict)
-    # the points at tail and head of each edge, and whether its frame is a reflection
+    # by edge, the points at its tail and head, and whether its frame is a reflection
     frames: dict[int, tuple[int, int, bool]] = field(default_factory=dict)
 
 
 class NewFace(NamedTuple):
-    """A part of a face that was cut."""
+    """A triangle that is part of a face that was cut."""
 
-    parent: int  # the face that it is a part of
+    parent: int  # the face of which it is a part
     corners: Sequence[int]  # three vertices
-    edges: Sequence[int]  # three edges, from corner k to corner k + 1
-    ahead: Sequence[bool]  # whether it runs along each edge from tail to head
+    edges: Sequence[int]  # three edges, number k from corner k to corner k + 1
+    ahead: Sequence[bool]  # whether corner k is the tail of edge k
     positions: Complexes  # (3,) corners in the layout of the parent
 
 
 class NewSegment(NamedTuple):
-    """A segment, or part of one; `face` has no meaning where it runs along an edge."""
+    """A segment of a source, or a part of one. If it runs along an edge, `face` has no meaning."""
 
     start: int  # nodes at its ends
     end: int
@@ -320,7 +328,7 @@ class NewSegment(NamedTuple):
 
 
 def with_middles(way: Sequence[int], middles: dict[Edge, int]) -> list[int]:
-    """Return the points along a way, with the middles of its edges that were divided later."""
+    """Return the points along a path, with the midpoints of those of its edges that were divided."""
     points = [way[0]]
     for u, v in pairwise(way):
         points += with_middles([u, middles[u, v], v], middles)[1:] if (u, v) in middles else [v]
@@ -330,7 +338,10 @@ def with_middles(way: Sequence[int], middles: dict[Edge, int]) -> list[int]:
 def points_on_elements(
     triangles: IntrinsicMesh, kinds: Ints, elements: Ints, along: Floats, barycentric: Floats
 ) -> LocatedPoints:
-    """Locate points given by their elements: by the fraction `along` an edge, or by `barycentric` coordinates."""
+    """Return points at vertices, on edges and in faces, given by the kind and id of their elements.
+
+    A point on an edge is given by the fraction `along` it, and one in a face by its `barycentric` weights.
+    """
     faces, weights = elements.copy(), barycentric.copy()
     at_vertex, on_edge = kinds == VERTEX, np.flatnonzero(kinds == EDGE)
     vertices = points_at_vertices(triangles, elements[at_vertex])
@@ -343,7 +354,10 @@ def points_on_elements(
 def flip_new_faces(
     triangles: IntrinsicMesh, merged: MergedSources, is_new: Bools
 ) -> tuple[IntrinsicMesh, MergedSources]:
-    """Flip edges of new faces to Delaunay, except edges with a segment or point, and of faces with one inside."""
+    """Flip edges of new faces so that they are Delaunay; return the mesh, and the sources on it.
+
+    Edges with a segment or a point of a source, and edges of faces with one inside, are not flipped.
+    """
     if not triangles.agree_on_lengths:
         return triangles, merged
     on_edge, nodes = merged.edges >= 0, merged.nodes

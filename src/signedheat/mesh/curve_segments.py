@@ -1,4 +1,4 @@
-"""Curves and points on an intrinsic mesh: straight segments inside faces and along edges, and their end points."""
+"""Curves on an intrinsic mesh as straight segments inside faces or along edges, and isolated points on it."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from .unit_vectors import ANGLE_ROUNDING, unit
 
 @dataclass(frozen=True, eq=False)
 class CurveSegments:
-    """One source as straight segments, each of which lies in one face or along one edge."""
+    """A source as k straight segments between s nodes; each segment lies in one face or along one edge."""
 
     nodes: LocatedPoints  # (s,) distinct points of the source, in order of first appearance
-    ends: Ints  # (k, 2) the nodes that each segment joins; no segments for isolated points
+    ends: Ints  # (k, 2) nodes at the start and the end of each segment; none for isolated points
     faces: Ints  # (k,) a face that contains the segment
     edges: Ints  # (k,) the edge that the segment runs along, or −1 for a segment inside its face
     # (k,) normal times length: the direction in which φ grows, in the layout of the face, or in the frame of the edge
@@ -43,28 +43,28 @@ class CurveSegments:
 
     @classmethod
     def of_points(cls, nodes: LocatedPoints) -> CurveSegments:
-        """Make isolated points a source without segments."""
+        """Make a source of isolated points, without segments."""
         none = np.empty(0, dtype=np.int64)
         return cls(nodes, np.empty((0, 2), dtype=np.int64), none, none, np.empty(0, dtype=np.complex128), False)
 
     @cached_property
     def lengths(self) -> Floats:
-        """(k,) length of each segment."""
+        """Length of each segment, (k,) float."""
         return np.abs(self.vectors)
 
     @property
     def is_conforming(self) -> bool:
-        """Whether triangles can represent the source without being cut: all but unoriented curves that cross faces."""
+        """Whether triangles can represent the source without being cut; false for unoriented curves across faces."""
         return self.oriented or bool((self.nodes.kinds[self.ends] == VERTEX).all() and (self.edges >= 0).all())
 
 
 @dataclass(frozen=True, eq=False)
 class MergedSources:
-    """The segments of several sources in one list, with points that coincide counted once: see `CurveSegments`."""
+    """The segments of several sources in one list, with coinciding points merged; see `CurveSegments`."""
 
     nodes: LocatedPoints  # (s,) distinct points of all sources
     ends: Ints  # (k, 2) nodes of each segment
-    faces: Ints  # (k,) each, as in `CurveSegments`
+    faces: Ints  # (k,) as edges and vectors, with the meaning that they have in `CurveSegments`
     edges: Ints
     vectors: Complexes
     owners: Ints  # (k,) the source of each segment
@@ -87,7 +87,7 @@ class MergedSources:
         )
 
     def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:
-        """Return the sources one by one again."""
+        """Return the sources as separate ones again; `oriented` says for each whether it has two sides."""
         order = np.argsort(self.owners, kind="stable")
         bounds = np.searchsorted(self.owners[order], np.arange(len(oriented) + 1))
         parts = []
@@ -98,16 +98,17 @@ class MergedSources:
         return parts
 
     def part(self, own: Ints, nodes: Ints, oriented: bool) -> CurveSegments:
-        """Return a source that consists of some of the segments and nodes."""
+        """Return a source that consists of the segments with ids `own` and of the given nodes."""
         distinct, first = np.unique(nodes, return_index=True)
         ends = first[np.searchsorted(distinct, self.ends[own])]
         return CurveSegments(self.nodes[nodes], ends, self.faces[own], self.edges[own], self.vectors[own], oriented)
 
 
 def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[Ints, Ints]:
-    """Find curves that repeat others: (u,) the first curve of each kind, and (k,) which of these each curve repeats.
+    """Find curves that are copies of others.
 
-    Curves in `by_points` (k,) repeat others that join the same points in the same directions; normals may differ.
+    Returns (u,) the first curve of each set of copies, and (k,) for each curve the index among these. Only curves for
+    which `by_points`, (k,), is true are copies, if they join the same points in the same directions.
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
@@ -121,7 +122,10 @@ def without_copies(parts: Sequence[CurveSegments], by_points: Bools) -> tuple[In
 
 
 def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple[list[CurveSegments], Ints]:
-    """Join curves that `may_go_on` (k,) into lines where no third curve ends; return lines, and that of each curve."""
+    """Join curves that begin where another ends into lines, unless they run back along each other.
+
+    Only curves for which `may_go_on`, (k,), is true are joined. Returns the lines, and (k,) the line of each curve.
+    """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
     (tails, second), (last, heads) = merged.ends[bounds[:-1]].T, merged.ends[bounds[1:] - 1].T
@@ -146,7 +150,10 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
 
 
 def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> list[CurveSegments]:
-    """Leave out points at which lines go straight on within a face, unless other lines or normals need them."""
+    """Leave out nodes at which a line runs straight within a face or along an edge.
+
+    Nodes stay if other lines end or bend there, or if the normals of the line change there.
+    """
     merged = MergedSources.of(parts)
     faces, vectors = merged.faces, merged.vectors
     node, before, after = _nodes_between(merged)
@@ -173,7 +180,10 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
 
 
 def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
-    """Return nodes at which one segment of a source goes straight on in another, and the segments before and after."""
+    """Return nodes at which two segments of a source have the same face or edge, and the same normal.
+
+    Also returns the segments before and after each of these nodes. Closed runs of segments keep one node.
+    """
     k = len(merged.ends)
     of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
     places, index = np.unique(of_source, return_inverse=True)
@@ -198,7 +208,11 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
 
 
 def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
-    """Return the run of each of k segments, numbered by first segments, and the first and last segment of each run."""
+    """Group k segments to runs, where segment ``after[i]`` follows segment ``before[i]``.
+
+    Returns (k,) the run of each segment, and (r,) the first and (r,) the last segment of each run. Runs are sorted by
+    their first segment.
+    """
     is_first, is_last = np.ones(k, dtype=bool), np.ones(k, dtype=bool)
     is_first[after] = False
     is_last[before] = False
@@ -214,7 +228,11 @@ def _runs(k: int, before: Ints, after: Ints) -> tuple[Ints, Ints, Ints]:
 def given_directions(
     triangles: IntrinsicMesh, positions: Floats, faces: Ints, edges: Ints, normals: Floats, name: str
 ) -> Complexes:
-    """Return (k,) unit vectors along normals, projected into the layouts of faces, or averaged in edge frames."""
+    """Project (k, 3) normals of segments onto the surface; return (k,) unit vectors as complex numbers.
+
+    They are in the layout of the face, or, for segments along an edge, averages over the faces in the frame of the
+    edge. Raises a `SourceError`, in which `name` names the curve, if a normal is perpendicular to the surface.
+    """
     largest = np.abs(normals).max(axis=1, initial=0.0)
     extreme = (largest > 1e100) | ((largest > 0) & (largest < 1e-100))  # their squares overflow or underflow
     normals = normals / np.where(extreme, largest, 1.0)[:, None]
@@ -229,8 +247,8 @@ def given_directions(
     if len(along):
         owners, around = incident_faces(triangles, on_edges)
         side = (triangles.edges.face_edges[around] == edges[along][owners, None]).argmax(axis=1)
-        seen = in_layout(triangles, positions, around, normals[along[owners]])
-        np.add.at(directions, along[owners], triangles.in_edge_frames(seen, around, side))
+        projected = in_layout(triangles, positions, around, normals[along[owners]])
+        np.add.at(directions, along[owners], triangles.in_edge_frames(projected, around, side))
     length = np.abs(directions)
     scale = np.linalg.norm(normals, axis=1)
     flat = np.flatnonzero(length <= 1e-6 * scale)
@@ -244,7 +262,11 @@ def given_directions(
 
 
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
-    """Return (k,) −1 where the face that decides which side is left is turned against most of the curve's, else 1."""
+    """Return (k,) signs by which the left sides of a curve's segments agree.
+
+    The face of a segment, or the first face of its edge, decides which side is left. The sign is −1 where that face has
+    another orientation than those along most of the curve's length, and 1 elsewhere.
+    """
     telling, links, number = _agreement_around(triangles, faces, edges)
     signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
     most = float(np.sign(signs @ lengths)) or signs[0]
@@ -252,7 +274,7 @@ def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Fl
 
 
 def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> bool:
-    """Return whether the faces around a curve cannot all be oriented alike, as along the middle of a Möbius strip."""
+    """Whether the faces around a curve cannot be oriented consistently, as along the middle of a Möbius strip."""
     _, links, number = _agreement_around(triangles, faces, edges)
     of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
     links = Links(links.tails[of_two], links.heads[of_two], links.weights[of_two])
@@ -261,7 +283,11 @@ def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> boo
 
 
 def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tuple[Ints, Links, Ints]:
-    """Return the face that decides each segment's left, links between faces near a curve, and (m,) the faces' nodes."""
+    """Return a graph of the orientations of the faces near a curve.
+
+    These are (k,) the face that decides which side of each segment is left, weighted links between neighbouring faces,
+    negative where their orientations disagree, and (m,) the node of each face in the graph, valid near the curve.
+    """
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
@@ -280,19 +306,22 @@ def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tup
 
 
 def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors: Floats) -> Complexes:
-    """Project vectors in space into the planes of their faces; return (k,) layout coordinates."""
+    """Project (k, 3) vectors in space into the planes of faces; return (k,) complex numbers in the faces' layouts.
+
+    `positions` are those of vertices, (n, 3), or of the corners of faces, (m, 3, 3).
+    """
     of_faces = positions[faces] if positions.ndim == 3 else positions[triangles.corner_vertices[faces]]
     a, b, c = of_faces.transpose(1, 0, 2)
     first = unit(b - a)
     normal = unit(np.cross(first, c - a))
     second = np.cross(normal, first)
-    seen = np.einsum("ij,ij->i", vectors, first) + 1j * np.einsum("ij,ij->i", vectors, second)
+    projected = np.einsum("ij,ij->i", vectors, first) + 1j * np.einsum("ij,ij->i", vectors, second)
     edge = triangles.edge_vectors[faces, 0]
-    return seen * edge / np.abs(edge)
+    return projected * edge / np.abs(edge)
 
 
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
-    """Return the sparse (n, n_vertices) map from values at vertices to values at points: the rows of A in Eq. 14."""
+    """Return the sparse (n, n_vertices) matrix that interpolates values at vertices at n points (rows of A, Eq. 14)."""
     rows, corners = np.nonzero(located.barycentric > 0)
     places = rows, triangles.corner_vertices[located.faces[rows], corners]
     return csr_matrix((located.barycentric[rows, corners], places), shape=(len(located), triangles.n_vertices))

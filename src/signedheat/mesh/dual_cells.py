@@ -1,22 +1,21 @@
-"""The connectivity of dual contouring: which edges of a grid a level set crosses, and its pieces within each cell.
+"""Connectivity of dual contouring: the edges of a grid that a level set crosses, and its pieces within each cell.
 
-Each connected piece of the level set within a cell gets a vertex of its own, so that the surface is manifold wherever
-it passes (Nielson 2004, Schaefer, Ju & Warren 2007). A piece is a cycle of crossed edges of the cell, each linked to
-the next through a face. Where all four edges of a face are crossed, either way of linking them fits the signs: what is
-inside at the middle of the face decides. If then both links of a face belong to one piece on either side of it, two
-vertices would have two edges between them; the other way of linking divides the pieces, and is taken (Wenger 2013, Sec.
-3.2, does so by exchanging table entries).
+Each connected piece of the level set within a cell gets a vertex, so that the surface is manifold (Nielson 2004,
+Schaefer, Ju & Warren 2007). A piece is a cycle of crossed edges of the cell, each linked to the next through a face.
+Where all four edges of a face are crossed, there are two ways to link them, and the sign at the middle of the face
+decides. If both links then belong to one piece in both cells at the face, two vertices would have two edges between
+them. In this case the other way is used, which divides the pieces (Wenger 2013, Sec. 3.2, does so by exchanging table
+entries).
 
 Axes b and c follow axis a cyclically. Edge ``4 a + 2 β + γ`` of a cell runs along a, from the cell's first node shifted
 by β along b and γ along c. Face ``2 a + σ`` is the one across a, at the first node shifted by σ.
 
-Around a crossed edge from a to b lie four vertices, one in each cell. All triangles between them that stay within the
-four tetrahedra of the edge and two neighbouring vertices meet no triangle of another edge, since the tetrahedra of
-different edges do not overlap (Ju & Udeshi 2006, Sec. 4). On a regular grid the line between vertices of neighbouring
-cells always passes through the face between them, so that no vertices on faces are needed. Where neither diagonal stays
-within the tetrahedra, the four vertices are joined to the place where the edge is crossed. The only triangles that may
-meet others are therefore those with a vertex that has left its cell or shares it with another piece, and those of
-flipped edges.
+Around a crossed edge lie four vertices, one in each cell. The edge and two neighbouring vertices span a tetrahedron,
+four in all. Tetrahedra of different edges do not overlap (Ju & Udeshi 2006, Sec. 4), so triangles within them do not
+intersect those of other edges. On a regular grid the line between vertices of neighbouring cells always passes through
+the face between them, so that no vertices on faces are needed. Where neither diagonal of the four vertices stays within
+the tetrahedra, they are joined to the point where the edge is crossed. So the only triangles that may intersect others
+are those with a vertex outside its cell or in a cell with several pieces, and those of flipped edges.
 """
 
 from __future__ import annotations
@@ -37,17 +36,17 @@ from .triangles import flipped_along_creases
 CELLS_AROUND = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 """β and γ of an edge in the four cells around it, counter-clockwise as seen from the end of the edge."""
 AXES_AFTER = np.array([[0, 1, 2], [1, 2, 0], [2, 0, 1]])
-"""Each axis, followed by the two that come after it cyclically."""
+"""Each axis, followed by the next two axes, cyclically."""
 
 
 @dataclass(frozen=True, eq=False)
 class Crossings:
-    """Edges of a grid that a level set crosses."""
+    """e edges of a grid that a level set crosses."""
 
-    nodes: NDArray[np.integer]  # (e, 3) the first node of each
-    axes: NDArray[np.integer]  # (e,) the axis that it runs along
+    nodes: NDArray[np.integer]  # (e, 3) indices of the first node of each edge
+    axes: NDArray[np.integer]  # (e,) the axis along which it runs, 0 to 2
     rising: Bools  # (e,) whether the first node is inside
-    shares: Floats  # (e,) how far from the first node the crossing is, in cells
+    shares: Floats  # (e,) distance of the crossing from the first node, in cells
 
     @classmethod
     def joined(cls, parts: Sequence[Crossings]) -> Crossings:
@@ -57,29 +56,30 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class DualCells:
-    """Cells that a level set passes through."""
+    """c cells through which a level set passes, and its v pieces in them."""
 
-    places: NDArray[np.int32]  # (c, 3) first node of each
+    places: NDArray[np.int32]  # (c, 3) indices of the first node of each cell
     edges: NDArray[np.int32]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
     # (c, 12) the piece of the level set to which each crossed edge belongs; −1 where an edge is not crossed
     pieces: NDArray[np.int32]
-    owners: NDArray[np.int32]  # (v,) the cell of each piece, in order
+    owners: NDArray[np.int32]  # (v,) the cell of each piece, ascending
     quads: NDArray[np.int32]  # (e, 4) the pieces around each crossed edge, counter-clockwise as seen from its end
 
 
 class CrossedCells(NamedTuple):
-    """Cells around crossed edges."""
+    """c cells around e crossed edges."""
 
-    places: NDArray[np.int32]  # (c, 3) first node of each
+    places: NDArray[np.int32]  # (c, 3) indices of the first node of each cell
     edges: NDArray[np.int32]  # (c, 12) number of each crossed edge; −1 where an edge is not crossed
     rows: NDArray[np.int32]  # (e, 4) the cells around each crossed edge, counter-clockwise as seen from its end
-    sides: NDArray[np.int8]  # (e, 4) which of the 12 edges of each of these cells it is
+    sides: NDArray[np.int8]  # (e, 4) index of the crossed edge among the 12 edges of each of these cells
 
 
 def crossings_in(heights: NDArray[np.floating], first: Ints) -> Crossings:
-    """Find the crossed edges between the nodes of a window of a grid, along each axis; nodes at NaN have none.
+    """Find the crossed edges between the nodes of a window of a grid.
 
-    Heights are negative inside, and linear along edges.
+    `heights` are values at its nodes, negative inside, and linear along edges. `first` are the indices of its first
+    node in the grid, (3,). Edges with NaN at an end are not crossed.
     """
     below, held, parts = heights < 0, ~np.isnan(heights), []
     for axis in range(3):
@@ -93,7 +93,7 @@ def crossings_in(heights: NDArray[np.floating], first: Ints) -> Crossings:
 
 
 def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
-    """Find the cells of a grid around crossed edges."""
+    """Find the cells around crossed edges of a grid with `shape` nodes."""
     strides = np.array([shape[1] * shape[2], shape[2], 1])
     back = strides[AXES_AFTER[:, 1:]] @ CELLS_AROUND.T
     cells, numbers = np.unique((crossings.nodes @ strides)[:, None] - back[crossings.axes], return_inverse=True)
@@ -108,7 +108,10 @@ def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
 def dual_cells(
     crossings: Crossings, around: CrossedCells, shape: tuple[int, ...], inside: Callable[[Floats], Bools]
 ) -> DualCells:
-    """Find the pieces of a level set in the cells of a grid; `inside` tells which points, in cells, are inside."""
+    """Find the pieces of a level set in the cells around crossed edges of a grid with `shape` nodes.
+
+    ``inside(points)`` returns (n,) bool, true where (n, 3) points, in coordinates of nodes, are inside.
+    """
     places, edges, rows, sides = around
     ways = np.zeros((len(places), 6), dtype=np.bool_)
     cells, faces = np.nonzero(_crossed_faces(edges) == 4)
@@ -137,25 +140,31 @@ def dual_cells(
 
 
 def open_cells(edges: NDArray[np.int32]) -> Ints:
-    """Return the cells with a face of which an odd number of edges is crossed: a node around them has no value."""
+    """Return the cells with a face of which an odd number of edges is crossed, since a node of it has no value.
+
+    `edges` are those of `CrossedCells`, (c, 12).
+    """
     return np.flatnonzero((_crossed_faces(edges) % 2 == 1).any(axis=1))
 
 
 def _face_edges(faces: Ints) -> Ints:
-    """Return (n, 4) edges of faces of a cell, in order around them."""
+    """Return (n, 4) the edges, 0 to 11, around each of (n,) faces of a cell, 0 to 5."""
     axis, side = faces // 2, faces % 2
     b, c = 4 * AXES_AFTER[axis, 1], 4 * AXES_AFTER[axis, 2] + 2 * side
     return np.stack([b + side, c + 1, b + 2 + side, c], axis=1)
 
 
 def _crossed_faces(edges: NDArray[np.int32]) -> NDArray[np.int8]:
-    """Return (c, 6) how many edges of each face of each cell the surface crosses; edges it does not cross are −1."""
+    """Return (c, 6) the number of crossed edges around each face of cells, whose `edges` are −1 if not crossed."""
     crossed, kinds = _kinds(edges >= 0)
     return crossed[:, _face_edges(np.arange(6))].sum(axis=2, dtype=np.int8)[kinds]
 
 
 def _pieces(edges: NDArray[np.int32], ways: Bools) -> tuple[NDArray[np.int32], Ints]:
-    """Return (c, 12) the piece of each crossed edge, over all cells, or −1; and (c,) how many pieces each cell has."""
+    """Return (c, 12) the piece of each crossed edge, numbered over all cells, or −1, and (c,) numbers of pieces.
+
+    `edges` are −1 where not crossed, (c, 12), and `ways` the ways to link crossed edges at each face, (c, 6).
+    """
     flags, kinds = _kinds(np.concatenate([edges >= 0, ways], axis=1))
     pieces = _pieces_of_cell(flags[:, :12], flags[:, 12:])
     counts = (pieces.max(axis=1, initial=-1) + 1)[kinds]
@@ -166,7 +175,7 @@ def _pieces(edges: NDArray[np.int32], ways: Bools) -> tuple[NDArray[np.int32], I
 
 
 def _kinds(flags: Bools) -> tuple[Bools, Ints]:
-    """Return the distinct rows of (c, n) flags, of which there are few, and (c,) which of them each row is."""
+    """Return the distinct rows of (c, n) flags, n at most about 20, and (c,) the index of each row among these."""
     size = flags.shape[1]
     codes = np.packbits(flags, axis=1, bitorder="little") @ (1 << 8 * np.arange(-(-size // 8)))
     present = np.flatnonzero(np.bincount(codes, minlength=1 << size))
@@ -176,9 +185,10 @@ def _kinds(flags: Bools) -> tuple[Bools, Ints]:
 
 
 def _pieces_of_cell(crossed: Bools, ways: Bools) -> Ints:
-    """Return (c, 12) the piece of each crossed edge, from 0 on in each cell, or −1.
+    """Return (c, 12) the piece of each crossed edge, numbered from 0 in each cell, or −1.
 
-    Of four crossed edges of a face, way 0 links the first with the last, the second with the third; way 1 the others.
+    `crossed` is (c, 12). If all four edges of a face are crossed, its way, in `ways`, (c, 6), links the first with the
+    last and the second with the third if false, and the first with the second and the third with the last if true.
     """
     around = _face_edges(np.arange(6))
     of_faces = crossed[:, around]
@@ -193,15 +203,17 @@ def _pieces_of_cell(crossed: Bools, ways: Bools) -> Ints:
 
 
 DIAGONAL_CLEARANCE = 1e-6
-"""Distance, in cells, that a diagonal keeps from the sides of the tetrahedra."""
+"""Least distance, in cells, of a diagonal from the sides of the tetrahedra, for which it counts as inside them."""
 
 
 def dual_triangles(
     cells: DualCells, crossings: Crossings, vertices: Floats, fanned: Bools
 ) -> tuple[Floats, Ints, Ints]:
-    """Join the vertices of pieces, (v, 3) in cells, into outward triangles (m, 3), along the better diagonals.
+    """Make triangles, with outward normals, between the vertices of the four pieces around each crossed edge.
 
-    Where an edge is `fanned`, (e,), or has no possible diagonal, its crossing is a vertex; these edges are returned.
+    Each quadrilateral is divided along the better diagonal. If the edge is `fanned`, (e,), or neither diagonal is
+    possible, its crossing becomes a vertex, which is joined to the four others. Returns (n, 3) vertices in cells,
+    (m, 3) triangles, and the edges whose crossings are vertices. `vertices` are those of pieces, (v, 3) in cells.
     """
     quads, axes, shares = cells.quads, crossings.axes, crossings.shares
 
@@ -212,12 +224,12 @@ def dual_triangles(
     second, possible = in_chunks(chosen, np.arange(len(quads)))
     fan = fanned | ~possible
     plain, fans = np.flatnonzero(~fan), np.flatnonzero(fan)
-    turned_quads = np.where(second[plain, None], np.roll(quads[plain], -1, axis=1), quads[plain])
+    rotated = np.where(second[plain, None], np.roll(quads[plain], -1, axis=1), quads[plain])
     added = crossings.nodes[fans].astype(np.float64)
     added[np.arange(len(fans)), axes[fans]] += shares[fans]
     tips = np.repeat(len(vertices) + np.arange(len(fans)), 4)
     ends = quads[fans].ravel(), np.roll(quads[fans], -1, axis=1).ravel()
-    parts = turned_quads[:, [0, 1, 2]], turned_quads[:, [0, 2, 3]], np.stack([tips, *ends], axis=1)
+    parts = rotated[:, [0, 1, 2]], rotated[:, [0, 2, 3]], np.stack([tips, *ends], axis=1)
     faces = np.concatenate(parts, dtype=np.int64)
     falling = ~crossings.rising[np.concatenate([plain, plain, np.repeat(fans, 4)])]
     faces[falling] = faces[falling][:, ::-1]
@@ -225,14 +237,17 @@ def dual_triangles(
 
 
 def _better_diagonals(around: Floats, axes: NDArray[np.integer], shares: Floats) -> tuple[Bools, Bools]:
-    """Return (n,) whether the second diagonal is the better one, given corners around edges; and whether one fits."""
+    """Choose diagonals of quadrilaterals around crossed edges.
+
+    `around` are their corners relative to the first nodes of the edges, (n, 4, 3) in cells. Returns (n,) whether the
+    second diagonal is better than the first, and (n,) whether one of them stays within the tetrahedra of the edge.
+    """
     rows, corners = np.arange(len(around))[:, None], np.arange(4)
     height = around[rows, corners, axes[:, None]]
     flat = np.stack([around[rows, corners, AXES_AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
     safe, off, length = np.empty((2, len(axes)), dtype=bool), np.empty((2, len(axes))), np.empty((2, len(axes)))
     for k in range(2):
-        turned = np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1)
-        safe[k], crossed_at = _safe(*turned)
+        safe[k], crossed_at = _safe(np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1))
         off[k] = np.abs(crossed_at - shares)
         length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
     nearer = np.where(np.abs(off[0] - off[1]) > DIAGONAL_CLEARANCE, off[1] < off[0], length[1] < length[0])
@@ -240,9 +255,10 @@ def _better_diagonals(around: Floats, axes: NDArray[np.integer], shares: Floats)
 
 
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:
-    """Return vertices and triangles that do not pass through each other, if possible, with edges along creases.
+    """Make vertices and triangles that do not intersect each other, if possible, with edges along creases.
 
-    Vertices of triangles that do move on to the next of three `choices`, (3, v, 3), of which the last is in the cell.
+    `choices` are three positions for the vertex of each piece, (3, v, 3) in cells, the last of them in its cell. Where
+    triangles intersect, their vertices move to the next choice, or crossings become vertices.
     """
     count = choices.shape[1]
     chosen, fanned = np.zeros(count, dtype=np.int64), np.zeros(len(cells.quads), dtype=bool)
@@ -265,7 +281,11 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
 
 
 def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
-    """Return (n,) whether the diagonal from corner 0 to 2 stays in the tetrahedra, and where its faces cut the edge."""
+    """Return (n,) whether the diagonal from corner 0 to 2 stays within the tetrahedra of a crossed edge.
+
+    `flat`, (n, 4, 2), and `height`, (n, 4), are coordinates of corners across and along the edge, in cells. Also
+    returns (n,) the height at which the triangles along the diagonal cross the edge.
+    """
     p, r = flat[:, 0], flat[:, 2]
     side = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner
     rows = np.arange(len(flat))

@@ -1,4 +1,4 @@
-"""Edges of triangles and polygons: the halfedges along each, and how the faces that they belong to are connected."""
+"""Edges of triangles and polygons, the halfedges along them, and the orientation of connected faces."""
 
 from __future__ import annotations
 
@@ -13,51 +13,60 @@ from ..compiled import compiled
 from .components import connected_components, first_members, grouped
 
 CLEARANCE = 1e-3
-"""Least distance of crossings from the ends of edges, relative to their lengths, so that no two vertices coincide."""
+"""Least distance of a crossing from the ends of an edge, relative to the length of the edge, to which crossings are
+moved. So no two vertices of a level set coincide."""
 
 
 @dataclass(frozen=True, eq=False)
 class HalfedgePairs:
-    """Edges of polygons, and the halfedges that run along them; halfedge c begins at the face's corner c."""
+    """e edges of polygons, and the h halfedges along them; halfedge c begins at corner c of its face."""
 
-    edges: Ints  # (h,) edge of each halfedge; −1 where it joins a vertex to itself or its face is left out
-    counts: Ints  # (e,) halfedges of each edge
-    # (e,) the lowest and the second lowest halfedge of each edge; −1 where there is no second
+    edges: Ints  # (h,) edge of each halfedge; −1 if it joins a vertex to itself or its face is left out
+    counts: Ints  # (e,) number of halfedges of each edge
+    # (e,) the lowest and the second lowest halfedge of each edge; −1 if there is no second
     first: Ints
     second: Ints
 
     @property
     def around(self) -> Ints:
-        """(h,) number of halfedges along the edge of each; 0 for halfedges without an edge."""
+        """Number of halfedges along the edge of each halfedge, (h,) int; 0 for halfedges without an edge."""
         return np.append(self.counts, 0)[self.edges]
 
 
 @dataclass(frozen=True, eq=False)
 class FaceOrientation:
-    """Parts of a surface that are connected across edges of two faces, and which of their faces to turn to agree."""
+    """Parts of a surface, connected across edges of two faces, and the faces to flip to orient them consistently."""
 
-    parts: Ints  # (n_faces,) part of each face; parts are numbered by first appearance
-    turned: Bools  # (n_faces,) whether each face must be turned; False in parts that cannot be oriented
-    orientable: Bools  # (n_parts,) whether all neighbours of the part can agree
-    disagreeing: int  # number of edges whose two faces run along them the same way
+    parts: Ints  # (n_faces,) part of each face; parts are numbered in order of their first face
+    turned: Bools  # (n_faces,) whether each face must be flipped; false in parts that cannot be oriented
+    orientable: Bools  # (n_parts,) whether each part can be oriented consistently
+    disagreeing: int  # number of edges whose two faces run along them in the same direction
 
 
 def following_corners(offsets: Ints) -> NDArray[np.int32]:
-    """Return (c,) the corner that follows each around its face."""
+    """Return (c,) the corner after each corner around its face; face f has corners offsets[f] to offsets[f + 1] − 1."""
     following = np.arange(1, offsets[-1] + 1, dtype=np.int32)
     following[offsets[1:] - 1] = offsets[:-1]
     return following
 
 
 def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None = None) -> HalfedgePairs:
-    """Find the edges of polygons and the first two used halfedges of each. The time is O(n), even at hubs."""
+    """Find the edges of polygons from the (h,) tails and heads of their halfedges.
+
+    If `used`, (h,), is given, only halfedges for which it is true count. The time is O(h), even at vertices of many
+    faces.
+    """
     chosen = tails != heads if used is None else used & (tails != heads)
     edges, _, *table = find_edges(read_only(tails), read_only(heads), chosen, n_vertices)
     return HalfedgePairs(edges, *table)
 
 
 def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | None = None) -> FaceOrientation:
-    """Find which triangles to turn to agree across edges of two used ones; in each part the larger weight stays."""
+    """Find the triangles to flip so that neighbours across edges of two triangles have consistent orientations.
+
+    Faces for which `used`, (m,), is false do not count. In each connected part, the orientation with the larger sum of
+    `weights`, (m,), is kept.
+    """
     tails, owners = faces.ravel(), np.repeat(np.arange(len(faces)), 3)
     pairs = pair_halfedges(
         tails, np.roll(faces, -1, axis=1).ravel(), n_vertices, None if used is None else used[owners]
@@ -77,7 +86,10 @@ def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | No
 
 
 def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.integer]) -> bool:
-    """Return whether two faces may have the same corners; tails and following corners are (c,)."""
+    """Whether two faces may have the same corners; if false, none do.
+
+    `tails` are the vertices at corners, (c,), and `following` the next corner of each around its face, (c,).
+    """
     two = pairs.counts == 2
     first, second = pairs.first[two], pairs.second[two]
     preceding = np.empty_like(following)
@@ -90,27 +102,29 @@ def may_coincide(pairs: HalfedgePairs, tails: Ints, following: NDArray[np.intege
 
 @dataclass(frozen=True, eq=False)
 class EdgeTable(Frozen):
-    """Edges, and how faces and edges are incident."""
+    """e edges of m triangles, and their incidence."""
 
-    vertices: Ints  # (e, 2) tail and head: the direction in which the FIRST face of the edge runs along it
+    vertices: Ints  # (e, 2) tail and head of each edge, in the direction in which its first face runs along it
     face_edges: Ints  # (m, 3) edge from corner k to corner k + 1 of each face
     forward: Bools  # (m, 3) whether the face runs along that edge from tail to head
 
     @cached_property
     def face_counts(self) -> Ints:
-        """(e,) number of faces at each edge: 1 at a boundary, more than 2 where nonmanifold."""
+        """Number of faces at each edge, (e,) int: 1 at a boundary, more than 2 where nonmanifold."""
         return read_only(np.bincount(self.face_edges.ravel(), minlength=len(self.vertices)))
 
     @cached_property
     def balance(self) -> Ints:
-        """(e,) number of faces that run along each edge, less those that run against it."""
+        """Number of faces that run along each edge from tail to head, less those from head to tail, (e,) int."""
         ahead = np.bincount(self.face_edges.ravel(), self.forward.ravel(), len(self.vertices)).astype(np.int64)
         return read_only(2 * ahead - self.face_counts)
 
     def unbalanced(self, groups: Ints, weights: Ints | int = 1) -> tuple[Ints, Ints, Ints]:
-        """Return (k,) groups of faces, (k,) edges that do not cancel in them, and (k,) excess of faces along these.
+        """Find the edges of groups of faces along which faces do not cancel.
 
-        Results ascend by group and edge. Face f is in `groups[f]` and counts `weights[f]` times, negative if against.
+        Face f is in group groups[f], (m,), and counts weights[f] times. Returns (k,) groups, (k,) edges, and (k,) the
+        number of faces that run along the edge less that of faces that run against it, which is not 0. They are sorted
+        by group and edge.
         """
         n, edges, owners = len(self.vertices), self.face_edges.ravel(), np.repeat(groups, 3)
         ways = (np.where(self.forward, 1, -1) * np.reshape(weights, (-1, 1))).ravel()
@@ -125,12 +139,12 @@ class EdgeTable(Frozen):
 
     @cached_property
     def halfedges(self) -> tuple[Ints, Ints]:
-        """(e + 1,) where the halfedges 3 f + k of each edge begin, and the halfedges: see `grouped`."""
+        """Halfedges 3 f + k of each edge, as (e + 1,) offsets and (3 m,) halfedges (`grouped`)."""
         return grouped(self.face_edges.ravel(), len(self.vertices))
 
     @cached_property
     def mates(self) -> Ints:
-        """(3 m,) the other halfedge of the edge of each, where there are exactly two; else −1."""
+        """The opposite halfedge of each halfedge, (3 m,) int, if its edge has exactly two; else −1."""
         starts, members = self.halfedges
         first = starts[:-1][np.diff(starts) == 2]
         mates = np.full(self.face_edges.size, -1)
@@ -139,18 +153,21 @@ class EdgeTable(Frozen):
 
     @cached_property
     def pairs(self) -> Ints:
-        """(k, 2) both halfedges of each edge that has exactly two."""
+        """Both halfedges of each edge that has exactly two, (k, 2) int."""
         first = np.flatnonzero(self.mates > np.arange(len(self.mates)))
         return read_only(np.stack([first, self.mates[first]], axis=1))
 
     def elimination_order(self, vertex_order: NDArray[np.integer]) -> Ints:
-        """Order edges for elimination by their ends' order, ``order[k]`` k-th: vertex separators separate edges."""
+        """Return (e,) an order of the edges for elimination, from a good one of the vertices, which are given in order.
+
+        Edges are sorted by their earlier end, so that a separator of vertices separates edges, too.
+        """
         a, b = np.argsort(vertex_order)[self.vertices].T  # the rank of each end
         return np.argsort((np.minimum(a, b) + 1) * len(vertex_order) - np.maximum(a, b), kind="stable")
 
 
 def edge_table(faces: Ints) -> EdgeTable:
-    """Find the edges of triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face)."""
+    """Find the edges of (m, 3) triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face)."""
     faces = np.asarray(faces, dtype=np.int64)
     tails, heads = faces.flatten(), np.roll(faces, -1, axis=1).ravel()
     every, n_vertices = np.ones(len(tails), dtype=np.bool_), int(tails.max(initial=-1)) + 1
@@ -160,15 +177,16 @@ def edge_table(faces: Ints) -> EdgeTable:
 
 
 def edge_keys(tails: NDArray[np.integer], heads: NDArray[np.integer]) -> Ints:
-    """Return (k,) a number for each pair of vertices, whichever of the two comes first."""
+    """Return (k,) a number for each pair of vertices, which is the same for both orders of the two."""
     return (np.minimum(tails, heads).astype(np.int64) << 32) | np.maximum(tails, heads)
 
 
 @compiled
 def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[Ints, Bools, Ints, Ints, Ints]:
-    """Find edges of the used halfedges (h,): the edge of each, or −1, and whether it runs as the first along it does.
+    """Find the edges of halfedges, given by (h,) tails and heads; those for which `used` is false have none.
 
-    Also returns (e,) the number of halfedges of each edge, the first one, and the second one or −1.
+    Returns (h,) the edge of each halfedge, or −1, and (h,) whether it has the direction of the first halfedge of its
+    edge; then for each of e edges its number of halfedges, its first halfedge, and its second halfedge or −1.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):
@@ -181,11 +199,11 @@ def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[
     for h in range(len(tails)):
         if not used[h]:
             continue
-        keeper, other = tails[h], heads[h]
-        if degrees[other] < degrees[keeper] or (degrees[other] == degrees[keeper] and other < keeper):
-            keeper, other = other, keeper
+        keeper, far_end = tails[h], heads[h]  # edges are listed at the end of lower degree
+        if degrees[far_end] < degrees[keeper] or (degrees[far_end] == degrees[keeper] and far_end < keeper):
+            keeper, far_end = far_end, keeper
         edge = last[keeper]
-        while edge >= 0 and tails[first[edge]] + heads[first[edge]] - keeper != other:
+        while edge >= 0 and tails[first[edge]] + heads[first[edge]] - keeper != far_end:
             edge = following[edge]
         if edge < 0:
             edge = n_edges

@@ -1,4 +1,4 @@
-"""Intrinsic triangulations, given by their gluing and their edge lengths alone, and flips to Delaunay.
+"""Intrinsic triangulations, given by the gluing of triangles and by edge lengths, and their edge flips to Delaunay.
 
 Halfedge ``3 f + k`` runs from corner k to corner k + 1 of face f. Two halfedges of one edge may lie in one face, and
 two edges may join the same two vertices, so nothing here is looked up by vertex ids.
@@ -19,11 +19,12 @@ from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
 FLIP_STEP, TURN_STEP, SPLIT_FACE, SPLIT_EDGE = 0, 1, 2, 3
-"""Kinds of steps in a history."""
+"""Kinds of steps in the history of a triangulation: an edge is flipped, a face is reversed, and a vertex is inserted in
+a face or on an edge."""
 N_FACES, N_EDGES, N_VERTICES, N_STEPS, N_STACKED = range(5)
-"""Places in `Gluing.counts`: numbers of faces, edges, vertices, steps of the history, and edges on the stack."""
+"""Indices in `Gluing.counts` of the numbers of faces, edges, vertices, steps of the history, and edges on the stack."""
 MOST_FLIPS = 1000
-"""Number of flips after which an edge is left as it is: rounding makes it flip back and forth."""
+"""Number of flips of an edge after which it is not flipped any more, since rounding makes it flip back and forth."""
 
 
 class Gluing(NamedTuple):
@@ -33,15 +34,15 @@ class Gluing(NamedTuple):
     tail: Ints
     edge: Ints
     forward: Bools  # (3 m,) whether the halfedge runs in the direction of its edge
-    # (3 m,) which of the two sides of its edge the halfedge is on; it stays until the edge is flipped, so that the two
-    # sides of a source stay apart
+    # (3 m,) on which of the two sides of its edge the halfedge is. It changes only when the edge is flipped, so that
+    # the two sides of a source are kept apart
     front: Bools
     sibling: Ints  # (3 m,) next halfedge of the same edge, cyclically; the halfedge itself at a boundary
     start: Ints  # (e,) one halfedge of every edge
     length: Floats  # (e,) length of every edge, in multiples of `unit`
     fixed: Bools  # (e,) edges that must not be flipped
     flips: Ints  # (e,) how often each edge has been flipped
-    counts: Ints  # (5,) how many there are of each: see `N_FACES`
+    counts: Ints  # (5,) numbers of faces and other elements, in the order of `N_FACES` and the following
     steps: Ints  # (s, 4) the history: kind of each step, two halfedges or faces, and the new vertex
     weights: Floats  # (s, 4) coefficients of the affine dependency of the points of each step
     scratch: Ints  # work array
@@ -50,19 +51,22 @@ class Gluing(NamedTuple):
 
 @compiled
 def following(h: int) -> int:
-    """Return the next halfedge around the face."""
+    """Return the next halfedge after h around its face."""
     return h + 1 if h % 3 < 2 else h - 2
 
 
 @compiled
 def preceding(h: int) -> int:
-    """Return the previous halfedge around the face."""
+    """Return the previous halfedge before h around its face."""
     return h - 1 if h % 3 else h + 2
 
 
 @compiled
 def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
-    """Return numerator and denominator of tan²(α/2), α opposite side a (Kahan); their product is 16 area²."""
+    """Return numerator and denominator of tan²(α/2) for the angle α opposite side a of a triangle (Kahan).
+
+    Their product is 16 times the square of the area.
+    """
     if b < c:
         b, c = c, b
     difference = a - b
@@ -73,14 +77,14 @@ def half_tangent(a: float, b: float, c: float) -> tuple[float, float]:
 
 @compiled
 def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
-    """Return the `half_tangent` of the corner at the tail of a halfedge."""
+    """Return the `half_tangent` of the angle at the tail of halfedge h."""
     n = following(h)
     return half_tangent(g.length[g.edge[n]], g.length[g.edge[h]], g.length[g.edge[preceding(h)]])
 
 
 @compiled
 def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
-    """Renumber halfedges old[k] to new[k], all at once; tails stay where they are."""
+    """Renumber halfedges old[k] to new[k], all at once, with edges and siblings; tails are not moved."""
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
     for k in range(len(old)):
         after = g.sibling[old[k]]
@@ -106,7 +110,7 @@ def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
 
 @compiled
 def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float, b: float, c: float, d: float) -> None:
-    """Write one step into the history."""
+    """Append a step to the history, with its kind, two halfedges or faces, the new vertex, and four weights."""
     n = g.counts[N_STEPS]
     g.steps[n, 0], g.steps[n, 1], g.steps[n, 2], g.steps[n, 3] = kind, first, second, vertex
     g.weights[n, 0], g.weights[n, 1], g.weights[n, 2], g.weights[n, 3] = a, b, c, d
@@ -115,7 +119,10 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
 
 @compiled
 def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
-    """Write the faces that step n changes or makes, or −1, and the corner of each at the first point of the step."""
+    """Write the up to three faces that step n changes or makes to `around`, −1 in place of missing ones.
+
+    Also write the corner of each face at which the points of the step begin to `start`.
+    """
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1
     start[0] = start[1] = start[2] = 0
@@ -129,7 +136,7 @@ def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
 
 @compiled
 def turn_over(g: Gluing, face: int) -> None:
-    """Reverse a face: corners (0, 1, 2) become (0, 2, 1)."""
+    """Reverse the orientation of a face, so that corners (0, 1, 2) become (0, 2, 1)."""
     h = 3 * face
     move(g, (h, h + 2), (h + 2, h))
     g.tail[h + 1], g.tail[h + 2] = g.tail[h + 2], g.tail[h + 1]
@@ -140,9 +147,10 @@ def turn_over(g: Gluing, face: int) -> None:
 
 @compiled
 def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
-    """Unfold the two faces at an edge into one plane: ``h: i → j`` with apex a, its twin with apex b.
+    """Unfold the two faces at an edge into one plane: that of ``h: i → j`` with apex a, that of its twin with apex b.
 
-    Returns the areas of jab, iab, twin and h, for which area_jab·i + area_iab·j = area_twin·a + area_h·b, and |ab|.
+    Returns the areas of triangles jab, iab, of the twin's face and of the face of h, and the length |ab|. The areas
+    are weights with area_jab·i + area_iab·j = area_twin·a + area_h·b. All are 0 if a face is degenerate.
     """
     t = g.sibling[h]
     mirrored = g.forward[h] == g.forward[t]
@@ -167,7 +175,10 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
 
 @compiled
 def flip(g: Gluing, h: int) -> bool:
-    """Flip an edge, so that h is ``b → a``; return False unless the two faces form a strictly convex quadrilateral."""
+    """Flip the edge of h, so that h runs from apex b to apex a.
+
+    Returns False, without a flip, unless the two faces form a strictly convex quadrilateral.
+    """
     t = g.sibling[h]
     if g.forward[h] == g.forward[t]:
         turn_over(g, t // 3)
@@ -189,7 +200,10 @@ def flip(g: Gluing, h: int) -> bool:
 
 @compiled
 def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
-    """Flip stacked edges until all that are not fixed are Delaunay; return False if the history is full before."""
+    """Flip edges on the stack until all edges that are not fixed are Delaunay; return False if the history is full.
+
+    `stacked`, (e,), says which edges are on the stack.
+    """
     while g.counts[N_STACKED] > 0:
         if g.counts[N_STEPS] + 2 > len(g.steps):
             return False
@@ -231,7 +245,7 @@ def new_edge(g: Gluing, length: float, fixed: bool) -> int:
 
 @compiled
 def apex(g: Gluing, h: int) -> complex:
-    """Return the face's third corner, above the halfedge, which runs along the positive real axis from the origin."""
+    """Return the third corner of the face of h, laid out with h on the positive real axis, its tail at the origin."""
     base, right, left = g.length[g.edge[h]], g.length[g.edge[following(h)]], g.length[g.edge[preceding(h)]]
     n, d = half_tangent(right, base, left)
     return complex(0.5 * (base + (left - right) * (left + right) / base), 0.5 * np.sqrt(n * d) / base)
@@ -245,19 +259,22 @@ def cross(a: complex, b: complex) -> float:
 
 @compiled
 def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
-    """Insert a vertex x at (u, v, w) into a face (a, b, c), which becomes (a, b, x), (b, c, x), (c, a, x); return x."""
+    """Insert a vertex x with barycentric coordinates (u, v, w) into face f, and return its id.
+
+    Face (a, b, c) becomes (a, b, x), and (b, c, x) and (c, a, x) are new.
+    """
     h = 3 * f
     n: int = g.counts[N_FACES]
     x: int = g.counts[N_VERTICES]
     a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
     base = g.length[g.edge[h]]
     top = apex(g, h)
-    place = v * base + w * top
+    position = v * base + w * top
     record(g, SPLIT_FACE, f, n, x, u, v, w, 1.0)
     to_a, to_b, to_c = (
-        new_edge(g, abs(place), False),
-        new_edge(g, abs(place - base), False),
-        new_edge(g, abs(place - top), False),
+        new_edge(g, abs(position), False),
+        new_edge(g, abs(position - base), False),
+        new_edge(g, abs(position - top), False),
     )
     g.counts[N_VERTICES], g.counts[N_FACES] = x + 1, n + 2
     k, l = 3 * n, 3 * n + 3
@@ -271,9 +288,10 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
 
 @compiled
 def split_edge(g: Gluing, h: int, fraction: float) -> int:
-    """Insert a vertex on an edge, `fraction` of the way along halfedge h, and split all its faces; return the vertex.
+    """Insert a vertex x on the edge of h, at a `fraction` of the length from the tail of h, and return its id.
 
-    Face (tail, head, apex) becomes (tail, x, apex) and a new (x, head, apex). No face may have the edge twice.
+    Each face (tail, head, apex) at the edge becomes (tail, x, apex), and (x, head, apex) is new. No face may have the
+    edge twice.
     """
     count = sibling_count(g, h)
     around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
@@ -313,7 +331,7 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
 
 @compiled
 def sibling_count(g: Gluing, h: int) -> int:
-    """Return the number of halfedges of an edge."""
+    """Return the number of halfedges of the edge of h."""
     count, y = 1, g.sibling[h]
     while y != h:
         count += 1
@@ -323,14 +341,14 @@ def sibling_count(g: Gluing, h: int) -> int:
 
 @compiled
 def pair(g: Gluing, h: int, tail: int, t: int, head: int, e: int) -> None:
-    """Glue two halfedges into a new edge."""
+    """Make e the edge of halfedges h and t, which run in opposite directions from vertices `tail` and `head`."""
     g.tail[h], g.edge[h], g.forward[h], g.front[h], g.sibling[h] = tail, e, True, True, t
     g.tail[t], g.edge[t], g.forward[t], g.front[t], g.sibling[t] = head, e, False, False, h
     g.start[e] = h
 
 
 def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
-    """Start an intrinsic triangulation with an empty history."""
+    """Copy an intrinsic mesh to a `Gluing` without history; edges with true `fixed_edges`, (e,), are never flipped."""
     edges, first = triangles.edges, triangles.first_halfedges
     edge, n_edges = edges.face_edges.ravel(), triangles.n_edges
     starts, order = edges.halfedges
@@ -361,7 +379,7 @@ def glue(triangles: IntrinsicMesh, fixed_edges: Bools | None = None) -> Gluing:
 
 
 def flip_all(gluing: Gluing) -> Gluing:
-    """Flip all edges that are not fixed to Delaunay, in place; return the gluing, its history enlarged if full."""
+    """Flip edges in place until all that are not fixed are Delaunay; return the gluing, with more room for history."""
     n_edges = int(gluing.counts[N_EDGES])
     gluing.counts[N_STACKED] = n_edges
     stack, stacked = np.arange(n_edges)[::-1].copy(), np.ones(n_edges, dtype=bool)
@@ -371,7 +389,7 @@ def flip_all(gluing: Gluing) -> Gluing:
 
 
 def lay_out(gluing: Gluing) -> IntrinsicMesh:
-    """Return the current triangulation as an intrinsic mesh, whose edges keep their ids and their frames."""
+    """Return the current triangulation as an intrinsic mesh; edges keep their ids and their frames."""
     n_faces, n_edges, n_vertices = gluing.counts[:3].tolist()
     corners, edge = gluing.tail[: 3 * n_faces].reshape(-1, 3).copy(), gluing.edge[: 3 * n_faces].copy()
     front, heads = np.flatnonzero(gluing.front[: 3 * n_faces]), np.roll(corners, -1, axis=1).ravel()
@@ -385,5 +403,5 @@ def lay_out(gluing: Gluing) -> IntrinsicMesh:
 
 
 def doubled(array: NDArray[Number]) -> NDArray[Number]:
-    """Return an array with as many rows of zeros appended as it has."""
+    """Return an array of twice as many rows, with zeros appended."""
     return np.concatenate([array, np.zeros_like(array)])

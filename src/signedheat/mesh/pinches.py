@@ -1,9 +1,9 @@
-"""Separation of the surfaces that meet in edges of more than two faces, and at vertices.
+"""Separation of surfaces that meet in edges of more than two faces, or at vertices.
 
-Around an edge of a closed surface, faces at which the inside begins and faces at which it ends follow each other in
-order of angle. Each of the first is paired with one of the second; what these pairs connect is separated from all else.
-Where the surface bounds a solid they alternate, and each pair has the inside between it. Where bodies overlap, faces
-that are connected elsewhere, through edges of two faces, are those of one body.
+Going around an edge of a closed surface, one enters the inside at some faces and leaves it at others. Each face of the
+first kind is paired with one of the second, and the surface is cut open between different pairs. Where the surface
+bounds a solid, the two kinds alternate, and the inside is between the faces of a pair. Where bodies overlap, faces that
+are connected elsewhere, through edges of two faces, are paired as those of one body.
 """
 
 from __future__ import annotations
@@ -19,7 +19,10 @@ from .unit_vectors import angles_around
 
 
 def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """Double the edges and vertices at which parts of a closed mesh touch, so that the insides of parts do not meet."""
+    """Double edges and vertices at which parts of a closed mesh touch, so that the mesh becomes manifold.
+
+    Edges that would still have more than two faces are divided at their midpoints. Returns points and faces.
+    """
     points, faces = separated(points, faces)
     while True:
         table = edge_table(faces)
@@ -36,22 +39,25 @@ def split_at_pinches(points: Floats, faces: Ints) -> tuple[Floats, Ints]:
 
 
 def separated(points: Floats, faces: Ints, overlapping: bool = False) -> tuple[Floats, Ints]:
-    """Give each fan of faces around a vertex a vertex of its own; `overlapping` keeps together what is one body.
+    """Give each fan of faces around a vertex a vertex of its own; return points and faces.
 
-    Edges that faces do not run along as often one way as the other connect nothing.
+    Faces are connected across edges as the module says, with `overlapping` as those of overlapping bodies. Edges along
+    which not as many faces run in one direction as in the other connect no faces.
     """
     table = edge_table(faces)
     starts, halfedges = table.halfedges
     edges = table.face_edges.ravel()
     crowded = np.flatnonzero(table.face_counts[edges[halfedges]] > 2)  # two faces have only one order
     around = halfedges.copy()
-    around[crowded] = _in_turn(points, faces, table.vertices[edges[halfedges[crowded]]], halfedges[crowded])
+    around[crowded] = _sorted_by_angle(points, faces, table.vertices[edges[halfedges[crowded]]], halfedges[crowded])
     labels = connected_components(len(faces), *table.pairs.T // 3) if overlapping else np.arange(len(faces))
     partners = _partners(starts, table.forward.ravel()[around], labels[around // 3])
     paired = partners >= 0
-    one, other = around[paired], around[partners[paired]]
-    following, beyond = (3 * (each // 3) + (each + 1) % 3 for each in (one, other))
-    corners = connected_components(faces.size, np.concatenate([one, following]), np.concatenate([beyond, other]))
+    leaving, entering = around[paired], around[partners[paired]]
+    leaving_next, entering_next = (3 * (h // 3) + (h + 1) % 3 for h in (leaving, entering))
+    corners = connected_components(
+        faces.size, np.concatenate([leaving, leaving_next]), np.concatenate([entering_next, entering])
+    )
     if int(corners.max(initial=-1)) + 1 == np.count_nonzero(np.bincount(faces.ravel())):
         return points, faces
     numbers, _ = by_first_use(corners, int(corners.max()) + 1)
@@ -60,8 +66,11 @@ def separated(points: Floats, faces: Ints, overlapping: bool = False) -> tuple[F
     return points[owners], numbers.reshape(-1, 3)
 
 
-def _in_turn(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
-    """Sort (k,) halfedges, given edge by edge with (k, 2) ends of their edges, by the angles of faces around edges."""
+def _sorted_by_angle(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
+    """Sort (k,) halfedges of each edge by the angles of their faces around the edge.
+
+    Halfedges are given edge by edge, with the (k, 2) tails and heads of their edges.
+    """
     tails, heads = points[ends].swapaxes(0, 1)
     away = points[faces.ravel()[3 * (halfedges // 3) + (halfedges + 2) % 3]] - tails
     angles = angles_around(heads - tails, away)
@@ -71,10 +80,12 @@ def _in_turn(points: Floats, faces: Ints, ends: Ints, halfedges: Ints) -> Ints:
 
 @compiled
 def _partners(starts: Ints, forward: Bools, labels: Ints) -> Ints:
-    """Return the place at which the inside begins for each place, in order around edges, at which it ends; else −1.
+    """Pair halfedges at which one leaves the inside, going around an edge, with those at which one enters it.
 
-    Of faces with one label, a single one at which it begins goes with a single one at which it ends; of the others, the
-    first one that begins with the first one that ends.
+    The halfedges of edge e, sorted by angle, have indices starts[e] to starts[e + 1] − 1. One leaves the inside at
+    `forward` ones, (h,). Of halfedges with the same label, (h,), one of each kind is a pair if there is one of each.
+    Others are paired in order, the first that enters with the first that leaves. Returns (h,) the index of the partner
+    of each halfedge at which one leaves, and −1 elsewhere, also at edges without as many of both kinds.
     """
     partners = np.full(len(forward), -1)
     for edge in range(len(starts) - 1):
@@ -82,16 +93,16 @@ def _partners(starts: Ints, forward: Bools, labels: Ints) -> Ints:
         rest, level = np.ones(count, dtype=np.bool_), 0
         for k in range(count):
             level += -1 if forward[first + k] else 1
-            begun, ended, other = 0, 0, 0
+            n_entering, n_leaving, entering = 0, 0, 0
             for j in range(count):
                 if labels[first + j] == labels[first + k]:
                     if forward[first + j]:
-                        ended += 1
+                        n_leaving += 1
                     else:
-                        begun, other = begun + 1, j
-            rest[k] = begun != 1 or ended != 1
+                        n_entering, entering = n_entering + 1, j
+            rest[k] = n_entering != 1 or n_leaving != 1
             if forward[first + k] and not rest[k]:
-                partners[first + k] = first + other
+                partners[first + k] = first + entering
         if level != 0:
             partners[first : first + count] = -1
             continue

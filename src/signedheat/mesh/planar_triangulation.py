@@ -1,4 +1,4 @@
-"""Constrained triangulations of triangles with points on their sides and within, and segments; and of polygons."""
+"""Constrained triangulations of polygons, and of triangles with points and segments in them."""
 
 from __future__ import annotations
 
@@ -11,42 +11,43 @@ from ..compiled import compiled
 from .components import connected_components
 
 FLAT_HEIGHT = 1e-13
-"""Height of a triangle, relative to the size of the face, below which it is flat."""
+"""Height of a triangle, relative to the size of the face, below which it counts as flat, and no flip may make it."""
 DELAUNAY_SINE = 1e-10
-"""Sine of the excess over π up to which two opposite angles satisfy Delaunay's condition."""
+"""Sine of the excess over π of two opposite angles, up to which an edge counts as Delaunay, and is not flipped."""
 
 FLIP_TRIES = 64
-"""Attempts to flip, per edge that a segment crosses, after which rounding is taken to prevent the flips. Where
-rounding did not, ten sufficed, even across a thousand edges."""
+"""Number of attempts to flip, per edge that a segment crosses, after which rounding is assumed to prevent the flips. In
+all cases without rounding ten sufficed, even across a thousand edges."""
 ROUNDS = 100
-"""Attempts to go on along a segment, beside one for each triangle, and number of points where it crosses others, beside
-one for each of them, after which it ends early."""
+"""Number of attempts to continue along a segment, in addition to the number of triangles, after which it ends early. It
+also ends after so many crossings with other segments, in addition to their number."""
 
 
 class Planar(NamedTuple):
-    """The triangulation of one face; edge k of a triangle begins at its vertex k."""
+    """A triangulation in the plane, with n points and t triangles; edge k of a triangle begins at its vertex k."""
 
-    x: Floats  # (n, 2) positions
+    x: Floats  # (n, 2) positions of points
     tri: Ints  # (t, 3) vertices of triangles, counter-clockwise
     adj: Ints  # (t, 3) triangle across each edge, or −1
     fixed: Bools  # (t, 3) whether each edge is part of a segment
     at: Ints  # (n,) a triangle at each vertex
     flat: float  # height below which a triangle is flat
     near: float  # distance up to which a point lies on a segment
-    room: Ints  # (2,) number of points and of triangles; where segments cross, points are added while there is room
-    parents: Ints  # (n, 2) ends of the edge that each added point divides
+    room: Ints  # (2,) number of points and of triangles in use; the arrays may be longer, for points at crossings
+    parents: Ints  # (n, 2) ends of the edge that each point at a crossing divides
 
 
 @compiled
 def triangulate_faces(
     points: Floats, starts: Ints, members: Ints, corners: Ints, segment_starts: Ints, segments: Ints
 ) -> tuple[Ints, Ints, Ints]:
-    """Triangulate faces, each with points on its rim and within, so that segments between these become edges.
+    """Triangulate m faces in space with points on their sides and inside, so that given segments become edges.
 
-    The points of face f are `members` from ``starts[f]`` on, those on its rim first and in order. A row of `corners`,
-    (m, 3), has the places of its second and third corner in this list, and the number of points on the rim; `segments`,
-    (t, 2), join two places. Returns triangles (k, 3), the face of each, ascending, and (k, 3) the triangle across each
-    edge, −1 across segments and rims.
+    The points of face f are the ids ``members[starts[f] : starts[f + 1]]`` of (n, 3) points, first those on its
+    boundary, in order from its first corner. A row of `corners`, (m, 3), has the indices in this list of the second and
+    third corner, and the number of points on the boundary. Its segments are rows ``segment_starts[f]`` to
+    ``segment_starts[f + 1]`` of `segments`, which join two points by their indices in the list. Returns (k, 3)
+    triangles, (k,) the face of each, ascending, and (k, 3) the triangle across each edge, −1 across segments and sides.
     """
     m = len(corners)
     total = np.int64(0)
@@ -82,13 +83,17 @@ def triangulate_faces(
 def triangulate_crossing(
     x: Floats, corners: Ints, segments: Ints, near: float
 ) -> tuple[Floats, Ints, Ints, Ints, Ints, Ints]:
-    """Triangulate a triangle in the plane with (n, 2) points on its rim and within, and segments that may cross.
+    """Triangulate a triangle in the plane with (n, 2) points on its sides and inside, and segments that may cross.
 
-    `corners` are as a row of those of `triangulate_faces`. A point lies on a segment up to a distance `near`. Returns
-    (n + c, 2) points, with those where segments cross; (c, 2) ends of the edge, part of an earlier segment, that each
-    of them divides; (k, 3) triangles, and the triangle across each edge, −1 across segments and rims; and the points
-    along all segments, one after the other, and where each begins, (s + 1,). A segment that rounding keeps from being
-    made ends before its second point.
+    `corners` has the indices of the second and third corner, and the number of points on the boundary, which come
+    first. `segments` join two points, (s, 2). A point lies on a segment up to a distance `near`. Returns
+
+    * (n + c, 2) the points, followed by those at which segments cross,
+    * (c, 2) the ends of the edge, a part of an earlier segment, that each crossing divides,
+    * (k, 3) triangles, and (k, 3) the triangle across each edge, −1 across segments and sides,
+    * the points along each segment, one segment after the other, and (s + 1,) offsets of these.
+
+    If rounding prevents a segment, its points end before its second end.
     """
     n, size = len(x), max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
     mesh = _rim(x, corners, FLAT_HEIGHT * size, near)
@@ -126,7 +131,11 @@ def triangulate_crossing(
 
 @compiled
 def _triangulate_apart(x: Floats, corners: Ints, segments: Ints) -> tuple[Ints, Ints]:
-    """Return Delaunay triangles and those across their edges, as `triangulate_crossing`; none if segments meet."""
+    """Triangulate a triangle with points and segments, as `triangulate_crossing`, if segments meet at ends only.
+
+    Returns (k, 3) constrained Delaunay triangles, and (k, 3) the triangle across each edge; empty arrays if a segment
+    crosses another or passes through a point.
+    """
     none, size = np.empty((0, 3), np.int64), max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
     mesh = _rim(x, corners, FLAT_HEIGHT * size, FLAT_HEIGHT * size)
     for i in range(corners[2], len(x)):
@@ -141,13 +150,14 @@ def _triangulate_apart(x: Floats, corners: Ints, segments: Ints) -> tuple[Ints, 
 
 
 AROUND = np.array([[-3.0, -2.0], [3.0, -2.0], [0.0, 3.0]])
-"""Corners of a triangle around points, relative to their size."""
+"""Corners of a triangle that contains a set of points, relative to the center of their box and its longest side."""
 
 
 def triangulate_polygon(points: Floats, n: int) -> Ints | None:
-    """Return the (k, 3) constrained Delaunay triangles of a counter-clockwise polygon through the first n points.
+    """Return (k, 3) constrained Delaunay triangles of a counter-clockwise polygon through the first n of (p, 2) points.
 
-    Of the other points, those within are used, too. None if the polygon crosses or touches itself, or runs clockwise.
+    Other points inside the polygon become vertices, too. The result is None if the polygon crosses or touches itself,
+    or runs clockwise.
     """
     size = float(np.ptp(points, axis=0).max())
     if not size > 0 or len(np.unique(points[:n], axis=0)) < n:
@@ -193,7 +203,10 @@ def _with_room(mesh: Planar) -> Planar:
 
 @compiled
 def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
-    """Return (n, 2) the two coordinates in which a face has most area, counter-clockwise, from its first corner."""
+    """Project the points of a face along the axis nearest to its normal; return (n, 2) counter-clockwise coordinates.
+
+    They are relative to the first corner. `members` and `corners` are those of the face, as in `triangulate_faces`.
+    """
     a, b, c = members[0], members[corners[0]], members[corners[1]]
     normal = np.empty(3)
     for d in range(3):
@@ -213,19 +226,22 @@ def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
 
 @compiled
 def _turn(x: Floats, a: int, b: int, c: int) -> float:
-    """Return twice the signed area of a triangle."""
+    """Return twice the signed area of triangle abc, which is positive if c is to the left of ab."""
     return (x[b, 0] - x[a, 0]) * (x[c, 1] - x[a, 1]) - (x[b, 1] - x[a, 1]) * (x[c, 0] - x[a, 0])
 
 
 @compiled
 def _length(x: Floats, a: int, b: int) -> float:
-    """Return the distance between two points."""
+    """Return the distance between points a and b."""
     return np.sqrt((x[b, 0] - x[a, 0]) ** 2 + (x[b, 1] - x[a, 1]) ** 2)
 
 
 @compiled
 def _rim(x: Floats, corners: Ints, flat: float, near: float) -> Planar:
-    """Divide a triangle at the points on its rim."""
+    """Start a triangulation of a triangle, with the points on its boundary only.
+
+    `x` are all (n, 2) points, and `corners` is a row as in `triangulate_faces`.
+    """
     n, rim = len(x), corners[2]
     count = 2 * n - rim - 2
     tri, adj = np.empty((count, 3), np.int64), np.full((count, 3), -1, np.int64)
@@ -244,7 +260,7 @@ def _rim(x: Floats, corners: Ints, flat: float, near: float) -> Planar:
 
 @compiled
 def _point_to(tri: Ints, adj: Ints, t: int, tail: int, neighbour: int) -> None:
-    """Set the neighbour of a triangle across the edge that begins at a vertex."""
+    """Set the neighbour of triangle t across its edge that begins at vertex `tail`; do nothing if t is −1."""
     if t >= 0:
         for k in range(3):
             if tri[t, k] == tail:
@@ -253,7 +269,7 @@ def _point_to(tri: Ints, adj: Ints, t: int, tail: int, neighbour: int) -> None:
 
 @compiled
 def _split(mesh: Planar, t: int, k: int, i: int) -> int:
-    """Put a vertex on edge k of a triangle; return the half from the vertex to the edge's head, which is new."""
+    """Split triangle t at vertex i on its edge k; return the new triangle, with the part of the edge after i."""
     tri, adj, fixed, at, new = mesh.tri, mesh.adj, mesh.fixed, mesh.at, mesh.room[1]
     a, b = (k + 1) % 3, (k + 2) % 3
     u, v, w = tri[t, k], tri[t, a], tri[t, b]
@@ -272,7 +288,7 @@ def _split(mesh: Planar, t: int, k: int, i: int) -> int:
 
 @compiled
 def _split_both(mesh: Planar, t: int, k: int, i: int) -> None:
-    """Put a vertex on edge k of a triangle, and on that of the triangle beyond."""
+    """Split triangle t, and its neighbour across edge k, at vertex i on this edge."""
     tri, adj = mesh.tri, mesh.adj
     a, b, s = tri[t, k], tri[t, (k + 1) % 3], adj[t, k]
     j = _place(tri, s, b)
@@ -286,7 +302,10 @@ def _split_both(mesh: Planar, t: int, k: int, i: int) -> None:
 
 @compiled
 def _flip(mesh: Planar, t: int, k: int) -> int:
-    """Flip edge k = ab between apexes c and d: its triangles become (c, a, d) and (d, b, c); return the second."""
+    """Flip edge k of triangle t, from a to b with apexes c and d.
+
+    Triangle t becomes (c, a, d), and its neighbour (d, b, c), which is returned.
+    """
     tri, adj, fixed, at = mesh.tri, mesh.adj, mesh.fixed, mesh.at
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -308,7 +327,7 @@ def _flip(mesh: Planar, t: int, k: int) -> int:
 
 @compiled
 def _insert(mesh: Planar, i: int) -> None:
-    """Put a point into the triangle that contains it and restore Delaunay by flips."""
+    """Insert point i as a vertex into the triangle or edge that contains it, and flip edges to Delaunay."""
     x, tri, adj, at = mesh.x, mesh.tri, mesh.adj, mesh.at
     t, k, depth = _locate(mesh, i)
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -334,7 +353,7 @@ def _insert(mesh: Planar, i: int) -> None:
 
 @compiled
 def _legalize(mesh: Planar, i: int) -> None:
-    """Flip edges opposite a new point until they are Delaunay."""
+    """Flip edges opposite the new vertex i until they are Delaunay."""
     tri, adj, fixed, at = mesh.tri, mesh.adj, mesh.fixed, mesh.at
     first = at[i]
     t = first
@@ -352,7 +371,7 @@ def _legalize(mesh: Planar, i: int) -> None:
 
 @compiled
 def _improve(mesh: Planar) -> None:
-    """Flip edges of a triangulation in place until all are Delaunay, but for fixed ones."""
+    """Flip edges in place until all that are not fixed are Delaunay."""
     adj, fixed = mesh.adj, mesh.fixed
     for _ in range(64):  # most faces need three passes
         flips = 0
@@ -367,7 +386,7 @@ def _improve(mesh: Planar) -> None:
 
 @compiled
 def _bad(mesh: Planar, t: int, k: int) -> bool:
-    """Return whether an edge is not Delaunay and can be flipped."""
+    """Return whether edge k of triangle t is not Delaunay and can be flipped."""
     x, tri, adj, flat = mesh.x, mesh.tri, mesh.adj, mesh.flat
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -385,14 +404,14 @@ def _bad(mesh: Planar, t: int, k: int) -> bool:
 
 @compiled
 def _convex(x: Floats, a: int, b: int, c: int, d: int, flat: float) -> bool:
-    """Return whether the edge from a to b between the apexes c, on its left, and d can be flipped."""
+    """Return whether edge ab can be flipped to cd, apexes c on its left and d on its right, without a flat triangle."""
     least = flat * _length(x, c, d)
     return _turn(x, c, a, d) > least and _turn(x, d, b, c) > least
 
 
 @compiled
 def _locate(mesh: Planar, i: int) -> tuple[int, int, float]:
-    """Return the triangle that contains a point, and for it what `_side` returns."""
+    """Return the triangle that contains point i, and the result of `_side` for both: the nearest edge and its area."""
     x, tri, adj, count = mesh.x, mesh.tri, mesh.adj, mesh.room[1]
     t = count - 1
     for _ in range(count):
@@ -413,7 +432,7 @@ def _locate(mesh: Planar, i: int) -> tuple[int, int, float]:
 
 @compiled
 def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
-    """Return the edge of a triangle with which a point spans the least signed area, and twice this area."""
+    """Return the edge of triangle t with which point i spans the least signed area, and twice this area."""
     side, depth = 0, np.inf
     for k in range(3):
         turn = _turn(x, tri[t, k], tri[t, (k + 1) % 3], i)
@@ -424,7 +443,7 @@ def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
 
 @compiled
 def _edge(mesh: Planar, u: int, v: int) -> int:
-    """Return the edge between two vertices as three times its triangle plus its index there; −1 if there is none."""
+    """Return the edge from u to v, as 3 t + k for edge k of triangle t; −1 if there is none."""
     tri, adj, at = mesh.tri, mesh.adj, mesh.at
     first = at[u]
     t, back = first, False
@@ -442,10 +461,11 @@ def _edge(mesh: Planar, u: int, v: int) -> int:
 
 @compiled
 def _connect(mesh: Planar, begin: int, done: Floats, a: int, b: int, way: list[int]) -> int:
-    """Make edges from a to b, along a segment to b, by flips (Sloan 1993), and add the points that it meets to a way.
+    """Make edges along a segment from `begin` to b, continuing at its point a, by flips (Sloan 1993).
 
-    Return the last one: b, unless rounding does not allow it, or the segment crosses another, where a point is added if
-    there is room.
+    Points on the segment are appended to `way`. ``done[0]`` is how far there are edges, as `_share` measures it.
+    Returns the last point: b, or an earlier one if rounding does not allow to continue, or if the segment crosses
+    another. There a point is added if there is room.
     """
     while a != b:
         t, k, goal = _aim(mesh, begin, done, a, b)
@@ -464,7 +484,7 @@ def _connect(mesh: Planar, begin: int, done: Floats, a: int, b: int, way: list[i
 
 @compiled
 def _fix(mesh: Planar, a: int, b: int) -> None:
-    """Make an edge part of a segment."""
+    """Mark the edge between a and b, in both of its triangles, as part of a segment."""
     for tail, head in ((a, b), (b, a)):
         edge = _edge(mesh, tail, head)
         if edge >= 0:
@@ -473,7 +493,11 @@ def _fix(mesh: Planar, a: int, b: int) -> None:
 
 @compiled
 def _aim(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> tuple[int, int, int]:
-    """Return the triangle at a and its edge that the segment to b crosses, and the neighbour that it meets, or −1."""
+    """Find where a segment from `begin` to b continues after its point a.
+
+    Returns the triangle at a that it enters, the edge of this by which it leaves, and the neighbour of a that it meets
+    first, or −1. The triangle is −1 if there is none.
+    """
     x, tri, adj, at = mesh.x, mesh.tri, mesh.adj, mesh.at
     first = at[a]
     t, back = first, False
@@ -499,13 +523,13 @@ def _aim(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> tuple[int, i
 
 @compiled
 def _share(x: Floats, a: int, b: int, i: int) -> float:
-    """Return how far along a segment a point lies, times the length of the segment."""
+    """Return how far along segment ab the projection of point i lies, times the length of the segment."""
     return (x[i, 0] - x[a, 0]) * (x[b, 0] - x[a, 0]) + (x[i, 1] - x[a, 1]) * (x[b, 1] - x[a, 1])
 
 
 @compiled
 def _meets(mesh: Planar, begin: int, done: Floats, b: int, i: int) -> bool:
-    """Return whether a segment meets a point beyond the share of it along which there are edges already."""
+    """Return whether point i is on the segment from `begin` to b, farther along than its edges so far, ``done[0]``."""
     x = mesh.x
     if not done[0] < _share(x, begin, b, i) <= _share(x, begin, b, b):  # else it would not end
         return False
@@ -514,7 +538,7 @@ def _meets(mesh: Planar, begin: int, done: Floats, b: int, i: int) -> bool:
 
 @compiled
 def _beside(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> int:
-    """Return the neighbour of a at which a segment to b goes on where rounding prevents flips; −1 at no triangle."""
+    """Return the neighbour of a through which a segment to b continues if rounding prevents flips, or −1."""
     x = mesh.x
     t, k, goal = _aim(mesh, begin, done, a, b)
     if goal >= 0 or t < 0:
@@ -525,7 +549,7 @@ def _beside(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> int:
 
 @compiled
 def _place(tri: Ints, t: int, a: int) -> int:
-    """Return which corner of triangle t is vertex a."""
+    """Return the corner, 0 to 2, of triangle t at vertex a."""
     k = 0
     while tri[t, k] != a:
         k += 1
@@ -534,9 +558,11 @@ def _place(tri: Ints, t: int, a: int) -> int:
 
 @compiled
 def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: int) -> int:
-    """Flip the edges that a segment crosses, from edge k of a triangle on; return the point that it meets, or −1.
+    """Flip the edges that a segment crosses, the first of which is edge k of triangle t.
 
-    At an edge of another segment a point is added, and a is returned: nothing is flipped.
+    The segment runs from `begin` to b, and has edges up to its point a. Returns the point of the segment to which there
+    is now an edge from a, or −1 if rounding prevents it. If the segment crosses another, a point is added there,
+    nothing is flipped, and a is returned.
     """
     x, tri, adj, fixed, flat = mesh.x, mesh.tri, mesh.adj, mesh.fixed, mesh.flat
     tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]
@@ -582,7 +608,7 @@ def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: in
 
 @compiled
 def _cross(mesh: Planar, t: int, k: int, a: int, b: int) -> bool:
-    """Add a point where a segment crosses edge k of a triangle, unless it does not, or there is no room."""
+    """Add a point where segment ab crosses edge k of triangle t; return False if it does not, or there is no room."""
     x, i = mesh.x, mesh.room[0]
     u, w = mesh.tri[t, k], mesh.tri[t, (k + 1) % 3]
     right, left = _turn(x, a, b, u), _turn(x, a, b, w)

@@ -1,4 +1,4 @@
-"""Polylines assembled from segments; closed outlines in the plane, and the regions that they fill."""
+"""Polylines assembled from segments, and the regions that closed outlines in the plane fill."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ from .triangles import AREA_ROUNDING
 manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
 
 FillRule: TypeAlias = Literal["nonzero", "evenodd"]
-"""Rule for the region that outlines fill: all points with a winding number that is not zero, or that is odd."""
+"""Rule for the region that outlines fill, the points whose winding number is not zero, or is odd."""
 
 
 def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[tuple[Ints, Bools, bool]]:
-    """Join segments end to end into polylines, which end at nodes where not exactly two segments meet.
+    """Join segments, given by their tails and heads, end to end into polylines.
 
-    Returns the segments of each in order, which of them run from head to tail (none if `directed`), and whether it is
-    closed.
+    They end at nodes at which not exactly two segments meet. If `directed`, one of the two must arrive and the other
+    leave. Returns for each polyline its segments in order, for each of these whether it runs from head to tail, and
+    whether the polyline is closed.
     """
     nodes, ends = np.unique(np.concatenate([tails, heads]), return_inverse=True)
     (tails, heads), n = ends.reshape(2, -1), len(nodes)
@@ -62,7 +63,10 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
 
 
 def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
-    """Return which of (n, d) points of a polyline are farther than `room` (n,) from the next, and the last if open."""
+    """Return the indices of the points of a polyline that are farther than their `room`, (n,), from the next point.
+
+    The last point of an open polyline is always among them.
+    """
     moves = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1) > room
     if not closed:
         moves[-1] = True
@@ -70,9 +74,10 @@ def leaving(points: Floats, closed: bool, room: Floats) -> Ints:
 
 
 def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
-    """Return the outlines, (n, 2) each, of the region that outlines fill: clockwise, those of holes counter-clockwise.
+    """Return the outlines of the region that closed outlines, (n, 2) points each, fill by a rule.
 
-    With "nonzero", an outline inside another is a hole if it runs the other way; otherwise directions do not matter.
+    They run clockwise, and around holes counter-clockwise. With "nonzero", an outline inside another is a hole if it
+    runs in the opposite direction. Apart from that, directions do not matter.
     """
     chosen(rule, FillRule, "fill")
     points = np.concatenate([np.empty((0, 2)), *outlines])
@@ -91,7 +96,10 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
 
 
 def without_seams(segments: Floats) -> Floats:
-    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out parts along which others run back."""
+    """Cut (k, 2, 2) segments of outlines where corners lie on them, and leave out parts that others run along reversed.
+
+    Returns (j, 2, 2) segments.
+    """
     # where outlines share a line, the boundary of the filled region runs along it there and back, up to rounding
     near = 1e-12 * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
     if near == 0:
@@ -116,7 +124,10 @@ def without_seams(segments: Floats) -> Floats:
 
 
 def _united(outlines: list[Floats]) -> Any:
-    """Return the region that outlines fill by the rule "nonzero", once the outermost, with all inside, run alike."""
+    """Return the region that outlines fill by the rule "nonzero", after outermost outlines get the same direction.
+
+    Outlines inside another are flipped together with it.
+    """
     nonzero = manifold3d.FillRule.NonZero
     parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
     boxes = np.array([[outline.min(axis=0), outline.max(axis=0)] for outline in outlines])
@@ -140,6 +151,6 @@ def _united(outlines: list[Floats]) -> Any:
 
 
 def _doubled_area(outline: Floats) -> float:
-    """Return twice the signed area that an outline (n, 2) encloses."""
+    """Return twice the signed area that an outline, (n, 2) points, encloses; positive if it runs counter-clockwise."""
     x, y = (outline - outline[0]).T
     return float(x @ np.roll(y, -1) - np.roll(x, -1) @ y)

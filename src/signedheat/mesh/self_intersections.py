@@ -1,4 +1,4 @@
-"""Triangles of a mesh that pass through each other."""
+"""Pairs of triangles of a mesh that intersect each other."""
 
 from __future__ import annotations
 
@@ -10,22 +10,26 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, in_threads
 from .box_tree import boxes_around, morton_codes
-from .turned_boxes import TRIANGLES_PER_LEAF, TurnedBoxes, boxes_apart, turned_apart
+from .oriented_boxes import TRIANGLES_PER_LEAF, OrientedBoxes, boxes_apart, oriented_apart
 from .unit_vectors import unit
 from .welding import same_positions, tolerances
 
 TOUCHING_DEPTH = 1e-10
-"""Depth up to which triangles only touch, relative to the size of the smaller of their parts."""
+"""Depth of an intersection, relative to the size of the smaller of their parts, up to which triangles only touch."""
 COVERING_FOLD = 1e-10
-"""One minus the cosine of the angle between two faces at their common edge, up to which one covers the other."""
+"""One minus the cosine of the angle between two faces at their common edge, up to which they are folded onto each
+other and overlap."""
 ARC_ROUNDING = 1e-6
-"""Angle between faces around a vertex, in radians, that may be rounding."""
+"""Angle between faces around a vertex, in radians, up to which they may overlap because of rounding."""
 CROWD = 64
 """Number of faces around a vertex above which their intersections are found by directions from it, not in space."""
 
 
 def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
-    """Return (k, 2) pairs of faces, one of them `asked` for, that intersect, overlap or touch without common vertex."""
+    """Return (k, 2) pairs of faces that intersect, overlap or touch without a common vertex.
+
+    If `asked`, (m,), is given, only pairs with a face for which it is true are returned.
+    """
     faces = same_positions(vertices)[faces]
     return overlapping_faces(vertices, faces, tolerances(vertices, faces, TOUCHING_DEPTH), asked)
 
@@ -33,8 +37,8 @@ def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None
 def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bools | None = None) -> Ints:
     """Return (k, 2) pairs of faces that overlap, or touch if they have no common vertex.
 
-    What is nearer than the (m,) slack of both faces touches. Faces with a common edge overlap if one is folded onto
-    the other.
+    Faces touch if their distance is below the (m,) slacks of both. Faces with a common edge overlap if one is folded
+    onto the other. If `asked`, (m,), is given, only pairs with a face for which it is true are returned.
     """
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
     if len(proper) < len(faces):
@@ -50,46 +54,49 @@ def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bool
     asked = np.ones(len(ids), dtype=np.bool_) if asked is None else asked[order]
     corners = vertices.take(ids, axis=0).reshape(-1, 9)
     triangles = Triangles(corners, ids, slacks)
-    pairs = _near(TurnedBoxes.of(corners, slacks, hubs, asked), triangles, False)
+    pairs = _near(OrientedBoxes.of(corners, slacks, hubs, asked), triangles, False)
     fans = np.flatnonzero(hubs >= 0)
     if len(fans):
         arcs = _arcs(vertices, ids[fans], hubs[fans])
         around = np.argsort(morton_codes(arcs.mean(axis=1)), kind="stable")
         fans, arcs, angles = fans[around], arcs[around].reshape(-1, 9), np.full(len(fans), ARC_ROUNDING)
         triangles = Triangles(corners[fans], ids[fans], slacks[fans])
-        tree = TurnedBoxes.of(arcs, angles, hubs[fans], asked[fans])
+        tree = OrientedBoxes.of(arcs, angles, hubs[fans], asked[fans])
         pairs = np.concatenate([pairs, fans[_near(tree, triangles, True)]])
     pairs = np.sort(order[pairs], axis=1)
     return pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
 
 
 class Triangles(NamedTuple):
-    """Triangles that may overlap."""
+    """n triangles that may overlap."""
 
-    corners: Floats  # (n, 9)
-    ids: Ints  # (n, 3) vertices
-    slacks: Floats  # (n,)
+    corners: Floats  # (n, 9) coordinates of the three corners
+    ids: Ints  # (n, 3) ids of the vertices
+    slacks: Floats  # (n,) distance below which each touches others
 
 
-def _near(tree: TurnedBoxes, triangles: Triangles, around: bool) -> Ints:
-    """Return (k, 2) pairs of triangles that overlap, given a tree of them: those `around` one hub, or all others."""
+def _near(tree: OrientedBoxes, triangles: Triangles, around: bool) -> Ints:
+    """Return (k, 2) pairs of triangles that overlap, found with a tree of their boxes.
+
+    If `around`, these are pairs around the same hub, otherwise all others.
+    """
     count = len(triangles.corners)
     tasks = 1 << max((count // ROWS_PER_TASK).bit_length() - 1, 0)
 
     def of_task(task: int) -> Ints:
         room = ROWS_PER_TASK
         while True:
-            found = np.empty((room, 2), dtype=np.int64)
-            count = _pairs_of(tree, triangles, around, task, 2 * tasks, found)
+            pairs = np.empty((room, 2), dtype=np.int64)
+            count = _pairs_of(tree, triangles, around, task, 2 * tasks, pairs)
             if count <= room:
-                return found[:count]
+                return pairs[:count]
             room = count
 
     return np.concatenate(list(in_threads(of_task, range(tasks, 2 * tasks))))
 
 
 def _hubs(faces: Ints, n_vertices: int) -> Ints:
-    """Return (m,) the corner of each face at which most faces meet, if these are more than `CROWD`, else −1."""
+    """Return (m,) the hub of each face, its vertex of most faces, if these are more than `CROWD`; else −1."""
     valences = np.bincount(faces.ravel(), minlength=n_vertices)
     if valences.max(initial=0) <= CROWD:
         return np.full(len(faces), -1)
@@ -99,7 +106,7 @@ def _hubs(faces: Ints, n_vertices: int) -> Ints:
 
 
 def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
-    """Return (m,) the order of triangles along a space-filling curve, with those around one hub together."""
+    """Return (m,) indices that sort triangles along a space-filling curve, with those around the same hub together."""
     lower, upper = boxes_around(corners)
     middles = 0.5 * (lower + upper)
     if not (hubs >= 0).any():
@@ -109,7 +116,10 @@ def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
 
 
 def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
-    """Return (k, 3, 3) triangles around the arcs that faces cover as seen from their hubs, apart for different hubs."""
+    """Return (k, 3, 3) triangles that contain the arcs of directions which faces cover as seen from their hubs.
+
+    Those of different hubs are moved apart, so that they do not overlap.
+    """
     corner = np.argmax(faces == hubs[:, None], axis=1)
     ends = [faces[np.arange(len(faces)), (corner + k) % 3] for k in (1, 2)]
     first, second = (unit(vertices[end] - vertices[hubs]) for end in ends)
@@ -121,12 +131,12 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
 
 
 @compiled
-def _pairs_of(tree: TurnedBoxes, triangles: Triangles, around: bool, node: int, end: int, out: Ints) -> int:
-    """Write pairs of triangles below a node, and of these with those of later nodes, as far as there is room.
+def _pairs_of(tree: OrientedBoxes, triangles: Triangles, around: bool, node: int, end: int, out: Ints) -> int:
+    """Write to `out` the pairs of overlapping triangles below a node, and of these with others below nodes up to `end`.
 
-    Returns their number.
+    Returns the number of pairs, which may be larger than the room in `out`.
     """
-    own, largest, turned = tree
+    own, largest, oriented = tree
     corners, ids, slacks = triangles
     count, stack, ways = 0, np.empty((256, 2), dtype=np.int64), np.empty((10, 3))
     leaves, n = len(largest) // 2, len(corners)
@@ -136,7 +146,7 @@ def _pairs_of(tree: TurnedBoxes, triangles: Triangles, around: bool, node: int, 
             depth -= 1
             a, b = stack[depth, 0], stack[depth, 1]
             slack = min(largest[a, 6], largest[b, 6])
-            if a != b and (boxes_apart(largest, a, largest, b, slack) or turned_apart(turned, a, b, slack)):
+            if a != b and (boxes_apart(largest, a, largest, b, slack) or oriented_apart(oriented, a, b, slack)):
                 continue
             if largest[a, 7] + largest[b, 7] <= 0.0:  # none asked for
                 continue
@@ -167,7 +177,7 @@ def _pairs_of(tree: TurnedBoxes, triangles: Triangles, around: bool, node: int, 
 
 @compiled
 def _overlapping(corners: Floats, ids: Ints, slacks: Floats, f: int, g: int, ways: Floats) -> bool:
-    """Return whether two triangles overlap, or, if they have a common edge, are folded along it."""
+    """Return whether triangles f and g overlap, or, if they have a common edge, are folded along it."""
     shared, apex, beyond = 0, 3, 3  # apex and beyond: 0 + 1 + 2 less two common corners is the third
     for i in range(3):
         for j in range(3):
@@ -183,9 +193,9 @@ def _overlapping(corners: Floats, ids: Ints, slacks: Floats, f: int, g: int, way
 
 @compiled
 def _beside(corners: Floats, f: int, g: int, i: int, j: int) -> bool:
-    """Return whether a plane between triangles with one common corner, `i` and `j`, has each on one side.
+    """Return whether a certain plane separates triangles f and g with one common corner, number i of f and j of g.
 
-    It is upright on the difference of the directions of their middles, as seen from that corner.
+    Its normal is the difference of the unit vectors from that corner to the midpoints of the opposite sides.
     """
     first, second = 0.0, 0.0
     a, b, c, d = 3 * ((i + 1) % 3), 3 * ((i + 2) % 3), 3 * ((j + 1) % 3), 3 * ((j + 2) % 3)
@@ -206,7 +216,10 @@ def _beside(corners: Floats, f: int, g: int, i: int, j: int) -> bool:
 
 @compiled
 def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
-    """Return whether triangles (9,) are folded along their common edge, opposite to corners `apex` and `beyond`."""
+    """Return whether triangles p and q, (9,) each, are folded onto each other along their common edge.
+
+    The edge is opposite to corner `apex` of p and corner `beyond` of q.
+    """
     start, end = 3 * ((apex + 1) % 3), 3 * ((apex + 2) % 3)
     square, height, other = 0.0, 0.0, 0.0
     for d in range(3):
@@ -225,7 +238,11 @@ def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
 
 @compiled
 def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
-    """Return whether triangles (9,) overlap by `depth` along all axes, −`slack` along normals; `ways` is scratch."""
+    """Return whether triangles p and q, (9,) each, overlap, by the separating axis test.
+
+    They do if their projections overlap by more than `depth` along all axes across sides. Along their normals the
+    projections may be apart by `slack`. `ways`, (10, 3), is a work array.
+    """
     ox, oy, oz = p[0], p[1], p[2]  # rounding of products belongs to these triangles, not to where they are
     for d in range(3):
         if min(p[d], p[3 + d], p[6 + d]) > max(q[d], q[3 + d], q[6 + d]) + slack:

@@ -1,4 +1,4 @@
-"""Signed graphs: signs ±1 of nodes from links between them, by merging and then turning groups of nodes."""
+"""Signed graphs: signs ±1 of nodes that agree with weighted links, by merging and then flipping groups of nodes."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from scipy.linalg import eigh
 from ..arrays import Floats, Ints
 from ..compiled import compiled
 
-TURNING_ROUNDS = 50
-"""Largest number of rounds of turning signs; usually a few suffice."""
+FLIP_ROUNDS = 50
+"""Largest number of rounds in which signs are flipped, after which it ends in any case; usually a few suffice."""
 
 
 @dataclass(frozen=True, eq=False)
 class Links:
-    """Evidence that the signs of pairs of nodes are equal, where a weight is positive, or opposite."""
+    """m links, evidence that the signs of two nodes are equal, if the weight is positive, or opposite."""
 
-    # (m,) the two nodes
+    # (m,) the two nodes of each link
     tails: Ints
     heads: Ints
-    weights: Floats  # (m,) how sure the evidence is; weights of the same pair add up
+    weights: Floats  # (m,) weight of the evidence; weights of the same pair add up
 
     @classmethod
     def joined(cls, *parts: Links) -> Links:
@@ -38,27 +38,30 @@ class Links:
         return (ends[0] + ends[1]).astype(np.float64)
 
     def coherence(self, signs: Floats) -> float:
-        """Return the share of weights that signs agree with, minus the share that they contradict."""
+        """Return the share of weights with which (n,) signs agree, minus the share that they contradict."""
         total = float((self.weights * signs[self.tails] * signs[self.heads]).sum())
         return total / max(float(np.abs(self.weights).sum()), np.finfo(float).tiny)
 
 
 def signs_of(links: Links, n_nodes: int) -> Floats:
-    """Return (n,) signs s that make Σ w s_tail s_head large: turning no sign, and hardly any group, increases it.
+    """Return (n,) signs s that make Σ w s_tail s_head large, so that flipping no single sign increases it.
 
-    Groups with the strongest links merge first (Keuper et al. 2015). Merges are then undone in reverse order, and after
-    each of these levels groups turn where that increases the sum.
+    Groups with the strongest links are merged first (Keuper et al. 2015). Merges are then undone in reverse order, and
+    after each of these levels groups are flipped if that increases the sum.
     """
     levels = _contractions(_weights(links, n_nodes))
     result = np.ones(int(levels[-1][1].max()) + 1 if levels else n_nodes)
     for weights, groups, within in reversed(levels):
         result = result[groups] * within
-        turn_where_better(weights.indptr, weights.indices, weights.data, result)
+        flip_where_better(weights.indptr, weights.indices, weights.data, result)
     return result
 
 
 def best_signs(weights: Floats, first: Floats) -> Floats:
-    """Return (n,) signs that make ``sᵀ W s`` large, W dense: groups turn while that gains, from several starts."""
+    """Return (n,) signs s that make ``sᵀ W s`` large, for dense symmetric weights W.
+
+    Groups are flipped as long as that increases it, from several starts, of which the signs `first`, (n,), are one.
+    """
     n = len(weights)
     weights = np.where(np.eye(n, dtype=bool), 0.0, weights)
     tails, heads = np.triu_indices(n, 1)
@@ -74,24 +77,27 @@ def best_signs(weights: Floats, first: Floats) -> Floats:
 
 
 def _flipped_in_groups(weights: Floats, groups: list[Ints], signs: Floats) -> Floats:
-    """Return the (n,) signs after negating, one after the other, each group that then agrees more with the rest."""
+    """Negate groups of (n,) signs, one after the other, that then agree more with all others; return the signs."""
     agreement, least = weights @ signs, 1e-12 * float(np.abs(weights).sum())
-    for _ in range(TURNING_ROUNDS):
-        turned = False
+    for _ in range(FLIP_ROUNDS):
+        any_flipped = False
         for group in groups:
             own = signs[group]
             outside = float(own @ agreement[group] - own @ weights[np.ix_(group, group)] @ own)
             if outside < -least:
                 signs[group] = -own
                 agreement -= 2 * weights[:, group] @ own
-                turned = True
-        if not turned:
+                any_flipped = True
+        if not any_flipped:
             break
     return signs
 
 
 def _contractions(weights: sparse.csr_matrix) -> list[tuple[sparse.csr_matrix, Ints, Floats]]:
-    """Merge nodes until no link is left; return for each level its weights, and the group and the sign of each node."""
+    """Merge nodes, level by level, until no link is left.
+
+    Returns for each level the weights between its nodes, (n, n), and the group of each node and its sign in it, (n,).
+    """
     levels = []
     while weights.nnz:
         groups, within = _contraction(weights)
@@ -104,7 +110,7 @@ def _contractions(weights: sparse.csr_matrix) -> list[tuple[sparse.csr_matrix, I
 
 
 def _weights(links: Links, n_nodes: int) -> sparse.csr_matrix:
-    """Return (n, n) symmetric sums of the weights between different nodes, without those that cancel."""
+    """Return the sparse symmetric (n, n) matrix of summed weights between different nodes, without sums that cancel."""
     apart = links.tails != links.heads
     tails, heads, weights = links.tails[apart], links.heads[apart], np.tile(links.weights[apart], 2)
     ends = np.concatenate([tails, heads]), np.concatenate([heads, tails])
@@ -115,7 +121,11 @@ def _weights(links: Links, n_nodes: int) -> sparse.csr_matrix:
 
 
 def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
-    """Return each node's group and sign in it; groups are mutually strongest pairs, and nodes most linked to one."""
+    """Group the nodes of a level: return (n,) the group of each node, and (n,) its sign in it.
+
+    A group is a pair of nodes each of which has its strongest link to the other, with all further nodes whose strongest
+    link is to one of the two.
+    """
     n, neighbors = weights.shape[0], weights.indices
     degrees = np.diff(weights.indptr)
     rows = np.repeat(np.arange(n), degrees)
@@ -136,16 +146,19 @@ def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
 
 
 @compiled
-def turn_where_better(starts: NDArray[np.int32], neighbors: NDArray[np.int32], weights: Floats, signs: Floats) -> None:
-    """Turn signs that disagree with their neighbours, one after the other, until none does."""
-    for _ in range(TURNING_ROUNDS):
-        turned = False
+def flip_where_better(starts: NDArray[np.int32], neighbors: NDArray[np.int32], weights: Floats, signs: Floats) -> None:
+    """Flip (n,) signs in place that disagree with their neighbours, one after the other, until none does.
+
+    Neighbours of node i, with weights, are those from starts[i] to starts[i + 1] − 1.
+    """
+    for _ in range(FLIP_ROUNDS):
+        any_flipped = False
         for node in range(len(signs)):
             agreement = 0.0
             for k in range(starts[node], starts[node + 1]):
                 agreement += weights[k] * signs[neighbors[k]]
             if agreement * signs[node] < 0.0:
                 signs[node] = -signs[node]
-                turned = True
-        if not turned:
+                any_flipped = True
+        if not any_flipped:
             break

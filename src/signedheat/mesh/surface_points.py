@@ -1,4 +1,4 @@
-"""Points on a surface: at a vertex, on an edge or inside a face, whichever face they are given through."""
+"""Points on a surface, at vertices, on edges or inside faces."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ from .edges import EdgeTable
 from .intrinsic_mesh import IntrinsicMesh
 
 VERTEX, EDGE, FACE = 0, 1, 2
-"""Kinds of elements that a point can lie on."""
+"""Kinds of elements on which a point can lie."""
 
 ZERO_COORDINATE = 1e-9
-"""Barycentric coordinate, or distance in these, below which it counts as zero: the point then lies on the edge, at the
-vertex, or on the segment."""
+"""Barycentric coordinate below which it counts as zero, so that the point lies on an edge or at a vertex. Differences
+and distances in such coordinates below it count as zero, too."""
 
 
 @dataclass(frozen=True, eq=False)
 class LocatedPoints:
-    """Points of a surface, each with the lowest-dimensional element that contains it."""
+    """n points of a surface, each with the lowest-dimensional element that contains it."""
 
     faces: Ints  # (n,) a face that contains the point
-    barycentric: Floats  # (n, 3) coordinates in that face; exact zeros on edges and at vertices
+    barycentric: Floats  # (n, 3) weights of the corners of that face; exact zeros on edges and at vertices
     kinds: Ints  # (n,) `VERTEX`, `EDGE` or `FACE`
     elements: Ints  # (n,) id of the vertex, edge or face
-    along: Floats  # (n,) on edges, the fraction of the way from tail to head; otherwise 0
+    along: Floats  # (n,) for points on edges, the fraction of the edge from its tail; otherwise 0
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -41,7 +41,7 @@ class LocatedPoints:
 
 
 def refuse_missing(kind: str, ids: Ints, n: int, name: str = "point") -> None:
-    """Refuse points that name a vertex, edge or face with an id that is not between 0 and n − 1."""
+    """Raise an error if ids of vertices, edges or faces, as `kind` says, are not between 0 and n − 1."""
     missing = np.flatnonzero((ids < 0) | (ids >= n))
     if len(missing):
         first = ids[missing[0]]
@@ -53,7 +53,10 @@ def refuse_missing(kind: str, ids: Ints, n: int, name: str = "point") -> None:
 
 
 def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, name: str = "point") -> LocatedPoints:
-    """Find the vertex, edge or face that contains each point, given by its face and barycentric coordinates."""
+    """Find the vertex, edge or face that contains each point, given by (n,) faces and (n, 3) barycentric coordinates.
+
+    `name` names a point in error messages.
+    """
     refuse_missing("face", faces, triangles.n_faces, name)
     inside = np.where(barycentric < ZERO_COORDINATE, 0.0, barycentric)
     inside /= inside.sum(axis=1, keepdims=True)
@@ -75,14 +78,17 @@ def locate_points(triangles: IntrinsicMesh, faces: Ints, barycentric: Floats, na
 
 
 def points_at_vertices(triangles: IntrinsicMesh, vertices: Ints) -> LocatedPoints:
-    """Locate vertices, each through its first face."""
+    """Return (n,) vertices as points, each in its first face."""
     corners = corners_at(triangles.corner_vertices, vertices, triangles.n_vertices)
     kinds = np.full(len(vertices), VERTEX)
     return LocatedPoints(corners // 3, np.eye(3)[corners % 3], kinds, vertices, np.zeros(len(vertices)))
 
 
 def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point") -> Ints:
-    """Return (k,) the first corner ``3 face + k`` at each vertex; only those below `n_vertices` may be asked for."""
+    """Return (k,) the first corner ``3 face + corner`` at each of k vertices.
+
+    Raises an error for vertices without a face, and for ids that are not below `n_vertices`.
+    """
     if not np.issubdtype(vertices.dtype, np.integer):
         if len(vertices) == 0:
             return np.empty(0, dtype=np.int64)
@@ -103,7 +109,7 @@ def corners_at(faces: Ints, vertices: Ints, n_vertices: int, name: str = "point"
 
 
 def contain(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Bools:
-    """Return (n,) whether face k contains point k."""
+    """Return (n,) bool, true if face faces[k] contains point k."""
     of_vertices, of_edges = (
         (table[faces] == located.elements[:, None]).any(axis=1)
         for table in (triangles.corner_vertices, triangles.edges.face_edges)
@@ -112,7 +118,7 @@ def contain(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Bo
 
 
 def barycentric_in(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints) -> Floats:
-    """Return (n, 3) barycentric coordinates of point k in face k, which must contain it."""
+    """Return (n, 3) barycentric coordinates of each point k in face faces[k], which must contain it."""
     weights: Floats = located.barycentric.copy()
     moved = np.flatnonzero(faces != located.faces)
     kinds, elements, along, moved_to = (
@@ -132,19 +138,25 @@ def barycentric_in(triangles: IntrinsicMesh, faces: Ints, located: LocatedPoints
 
 
 def barycentric_on_edges(edges: EdgeTable, faces: Ints, sides: Ints, along: Floats) -> Floats:
-    """Return (n, 3) barycentric coordinates, in faces, of points at fractions along edges, given as sides."""
+    """Return (n, 3) barycentric coordinates in faces of points on their edges.
+
+    The edges are given as sides, 0 to 2, of (n,) faces, and the points as fractions from the tails of the edges.
+    """
     return barycentric_on_sides(sides, np.where(edges.forward[faces, sides], along, 1 - along))
 
 
 def edges_between(triangles: IntrinsicMesh, faces: Ints, starts: Floats, ends: Floats) -> tuple[Ints, Ints]:
-    """Return the edge along which each segment in a face runs, or −1, and its side; ends are barycentric."""
+    """Return (k,) the edge along which each segment in a face runs, or −1, and (k,) the side of the face.
+
+    The ends of segments are barycentric coordinates in (k,) faces, (k, 3).
+    """
     empty = (starts == 0) & (ends == 0)
     sides = (empty.argmax(axis=1) + 1) % 3
     return np.where(empty.any(axis=1), triangles.edges.face_edges[faces, sides], -1), sides
 
 
 def barycentric_on_sides(sides: Ints, shares: Floats) -> Floats:
-    """Return (n, 3) barycentric coordinates of points at a fraction of the way along sides of faces."""
+    """Return (n, 3) barycentric coordinates of points at fractions along sides, 0 to 2, of faces."""
     weights, row = np.zeros((len(sides), 3)), np.arange(len(sides))
     weights[row, sides] = 1 - shares
     weights[row, (sides + 1) % 3] = shares
@@ -152,14 +164,21 @@ def barycentric_on_sides(sides: Ints, shares: Floats) -> Floats:
 
 
 def crossed_sides(above: Bools, chosen: Bools) -> tuple[Ints, Ints]:
-    """Return chosen faces that a level set crosses, and the (k, 2) sides it enters and leaves by."""
+    """Return (k,) chosen faces that a level set crosses, and (k, 2) the sides by which it enters and leaves them.
+
+    `above`, (m, 3), says whether each corner is above the level, and `chosen`, (m,), which faces count. The level set
+    has what is above it to its left.
+    """
     faces = np.flatnonzero(chosen & above.any(axis=1) & ~above.all(axis=1))  # `above` is to the left of the level set
     starts, ends = above[faces], np.roll(above[faces], -1, axis=1)
     return faces, np.stack([(starts & ~ends).argmax(axis=1), (ends & ~starts).argmax(axis=1)], axis=1)
 
 
 def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoints) -> Ints:
-    """Return (k,) a face that contains both ends, or −1; preferably a face through which one of them is given."""
+    """Return (k,) a face that contains both `start` and `end` of each segment, or −1.
+
+    A face in which one of the two is given is preferred; otherwise it is the one of least id.
+    """
     shared = np.where(contain(triangles, end.faces, start), end.faces, -1)
     shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
     left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
@@ -173,7 +192,7 @@ def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoi
 
 
 def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[Ints, Ints]:
-    """Return all faces that contain each point, as pairs: index of the point, and face."""
+    """Return all pairs of a point and a face that contains it, as (k,) indices of points and (k,) faces."""
     inside = np.flatnonzero(located.kinds == FACE)
     owners, faces = [inside], [located.elements[inside]]
     for kind, table, count in (
@@ -192,7 +211,10 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[In
 
 
 def unique_points(located: LocatedPoints) -> tuple[Ints, Ints]:
-    """Return the first index of each distinct point, in order of appearance, and the inverse index of all points."""
+    """Find points that coincide up to `ZERO_COORDINATE`.
+
+    Returns (u,) the first index of each distinct point, ascending, and (n,) the index of each point among these.
+    """
     inner = np.where((located.kinds == FACE)[:, None], located.barycentric, 0.0)
     columns = [located.kinds, located.elements, located.along, inner[:, 0], inner[:, 1]]
     order = np.lexsort(columns[::-1])

@@ -1,8 +1,8 @@
 """Tets in space: their faces, areas, volumes, and operators on them (Sec. 8.1, App. B).
 
-Diffusion has Crouzeix–Raviart functions on faces, integration linear functions on vertices. Everything follows from the
-outward area vectors N_k of the face opposite corner k of a tet T: the barycentric coordinate λ_k has gradient ``−N_k /
-(3|T|)``, the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has ``N_k / |T|``.
+Diffusion uses Crouzeix–Raviart functions on faces, and integration uses linear functions at vertices. All operators
+follow from the outward area vectors N_k of the face opposite corner k of a tet T. The barycentric coordinate λ_k has
+gradient ``−N_k / (3|T|)``, and the Crouzeix–Raviart function ``ψ_k = 1 − 3λ_k`` has gradient ``N_k / |T|``.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ FACE_CORNERS = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 
 @dataclass(frozen=True, eq=False)
 class FaceTable:
-    """The faces of tets, and how tets and faces are incident."""
+    """f faces of m tets, and their incidence."""
 
-    vertices: Ints  # (f, 3) vertex ids, counter-clockwise as seen from outside the FIRST tet at the face
+    vertices: Ints  # (f, 3) vertex ids, counter-clockwise as seen from outside the first tet at the face
     tet_faces: Ints  # (m, 4) face opposite each corner of each tet
 
     @cached_property
     def tet_counts(self) -> Ints:
-        """(f,) number of tets at each face: 1 on the boundary, more than 2 where nonmanifold."""
+        """Number of tets at each face, (f,) int: 1 on the boundary, more than 2 where nonmanifold."""
         return np.bincount(self.tet_faces.ravel(), minlength=len(self.vertices))
 
     @cached_property
     def neighbors(self) -> Ints:
-        """(m, 4) the tet beyond the face opposite each corner, −1 at the boundary."""
+        """The tet beyond the face opposite each corner, (m, 4) int; −1 at the boundary."""
         flat = self.tet_faces.ravel()
         _, order = grouped(flat, len(self.vertices))
         same = flat[order[1:]] == flat[order[:-1]]
@@ -48,7 +48,7 @@ class FaceTable:
 
 
 def face_table(tets: Ints) -> FaceTable:
-    """Find the faces of tets, numbered by first appearance, in linear time."""
+    """Find the faces of (m, 4) tets, numbered by first appearance, in linear time."""
     corners = tets[:, FACE_CORNERS].reshape(-1, 3)
     number, first = distinct_rows(np.sort(corners, axis=1))
     return FaceTable(corners[first], number.reshape(-1, 4))
@@ -56,37 +56,37 @@ def face_table(tets: Ints) -> FaceTable:
 
 @dataclass(frozen=True, eq=False)
 class TetShapes:
-    """Tets in space."""
+    """m tets in space, with quantities that depend on their shapes."""
 
     vertices: Floats  # (n, 3) positions
-    tets: Ints  # (m, 4) corners; of positive volume, or degenerate
+    tets: Ints  # (m, 4) vertex ids of the corners; volumes are positive, or tets degenerate
 
     @cached_property
     def area_vectors(self) -> Floats:
-        """(m, 4, 3) N_k: area times outward normal of the face opposite each corner."""
+        """Area times outward normal of the face opposite each corner, N_k, (m, 4, 3) float."""
         return np.stack([area_vectors(self.vertices[self.tets[:, face]]) for face in FACE_CORNERS], axis=1)
 
     @cached_property
     def volumes(self) -> Floats:
-        """(m,) signed volumes."""
+        """Signed volume of each tet, (m,) float."""
         return signed_volumes(self.vertices, self.tets)
 
     @cached_property
     def longest_edges(self) -> Floats:
-        """(m,) length of each tet's longest edge."""
+        """Length of the longest edge of each tet, (m,) float."""
         points = [self.vertices[self.tets[:, k]] for k in range(4)]
         squares = [np.square(points[i] - points[j]).sum(axis=1) for i in range(4) for j in range(i)]
         return np.sqrt(np.max(squares, axis=0))
 
     @cached_property
     def thickness(self) -> Floats:
-        """(m,) volume over the cube of the longest edge; zero for tets whose corners coincide."""
+        """Volume divided by the cube of the longest edge, (m,) float; 0 for inverted tets and coinciding corners."""
         cubes = self.longest_edges**3
         return np.maximum(self.volumes, 0) / np.where(cubes > 0, cubes, 1)
 
     @cached_property
     def faces(self) -> FaceTable:
-        """The triangles between and around the tets."""
+        """The triangular faces of the tets."""
         return face_table(self.tets)
 
     @cached_property
@@ -97,7 +97,10 @@ class TetShapes:
 
 
 def inside_out(mesh: TetShapes) -> Bools:
-    """Return (m,) whether rounding turned each tet over, so that a neighbour lies on the same side of their face."""
+    """Return (m,) bool, true for tets that rounding has inverted, so that a neighbour is on the same side of a face.
+
+    Of two consistent orientations of each connected part, the one with the larger sum of volumes counts as right.
+    """
     faces, m = mesh.faces, len(mesh.tets)
     a, b, c = np.moveaxis(mesh.tets[:, FACE_CORNERS], 2, 0)
     way = np.sign(a - b) * np.sign(b - c) * np.sign(c - a)  # parity of the corners' order, as seen from outside
@@ -118,57 +121,64 @@ def signed_volumes(vertices: Floats, tets: Ints) -> Floats:
 
 
 THIN_TET = 1e-2
-"""Volume, relative to the cube of the longest edge, below which a tet has a reduced weight; regular tets have 0.118."""
+"""Thickness, the volume relative to the cube of the longest edge, below which a tet has a reduced weight. Regular tets
+have 0.118."""
 FLAT_TET = 1e-6
-"""Volume, relative to the cube of the longest edge, below which a tet counts as flat."""
+"""Thickness below which a tet counts as flat, and gets an extra stiffness (`Tetrahedra.ties`)."""
 FLAT_STIFFNESS = 1e-4
-"""Stiffness between the faces or vertices of flat tets, relative to the longest edge."""
+"""Extra stiffness between the faces or vertices of flat tets, relative to the longest edge."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tetrahedra(TetShapes):
-    """Operators of tets."""
+    """Tets with the finite-element operators on their faces and vertices."""
 
     @cached_property
     def stiffness_factors(self) -> Floats:
-        """(m,) w / |T|, w the `weights`, by which every term of thin tets is reduced: the stiffness stays bounded."""
+        """Factor w / |T| of each tet, with w the `weights`, (m,) float; the stiffness of thin tets stays bounded."""
         thick = self.thickness >= THIN_TET
         cubes = np.where(self.longest_edges > 0, self.longest_edges, 1) ** 3
         return 1 / np.where(thick, np.maximum(self.volumes, np.finfo(float).tiny), THIN_TET * cubes)
 
     @cached_property
     def weights(self) -> Floats:
-        """(m,) w: one, less than one for thin tets, zero for flat ones."""
+        """Weight w of each tet, (m,) float: 1, or less for tets thinner than `THIN_TET`, down to 0."""
         return np.minimum(self.thickness / THIN_TET, 1)
 
     @cached_property
     def fading(self) -> Floats:
-        """(m,) further factor beside w in step 3, zero on flat tets, in which a curved φ has unbounded gradients."""
+        """Further factor of each tet in step 3, (m,) float, w²; a curved φ has unbounded gradients in flat tets."""
         return self.weights**2
 
     @cached_property
     def ties(self) -> Floats:
-        """(m,) extra stiffness between any two faces or vertices of a flat tet, since some belong to no other tet."""
+        """Extra stiffness between faces or vertices of each flat tet, (m,) float; some belong to no other tet."""
         lengths = np.maximum(self.longest_edges, 1e-3 * self.longest_edges.mean())
         return FLAT_STIFFNESS * lengths * (1 - np.minimum(self.thickness / FLAT_TET, 1))
 
     def face_mass(self) -> Floats:
-        """Return (f,) M of Eq. 12, row sums of Eq. 23, with a least value so that M + tL is positive definite."""
+        """Return (f,) the diagonal of M in Eq. 12, row sums of Eq. 23, made positive so that M + tL is definite."""
         quarter = np.repeat(self.weights * self.volumes / 4, 4)
         mass = np.bincount(self.faces.tet_faces.ravel(), quarter, len(self.faces.vertices)).astype(np.float64)
         return np.maximum(mass, 1e-9 * mass.mean())  # from 1e-12 to 1e-4 no test of tets changes
 
     def face_laplacian(self) -> sparse.csr_matrix:
-        """Return (f, f) the Laplacian of faces (Eq. 20, Eq. 21): L_ab = Σ_T N_a·N_b / |T|, plus `ties`."""
+        """Return the sparse (f, f) Laplacian of faces, L_ab = Σ_T N_a·N_b / |T|, plus `ties` (Eq. 20, Eq. 21)."""
         faces = self.faces
         return _assemble(self.area_vectors, self.stiffness_factors, self.ties, faces.tet_faces, len(faces.vertices))
 
     def vertex_laplacian(self, corners: Ints, n: int) -> sparse.csr_matrix:
-        """Return (n, n) the cotan Laplacian, Eq. 10 in tets: C_ij = Σ_T N_i·N_j / (9|T|), plus `ties`."""
+        """Return the sparse (n, n) cotan Laplacian C_ij = Σ_T N_i·N_j / (9|T|), plus `ties` (Eq. 10 in tets).
+
+        `corners` are the ids, below n, of the unknowns at corners, (m, 4).
+        """
         return _assemble(self.area_vectors, self.fading * self.stiffness_factors / 9, self.ties, corners, n)
 
     def divergence(self, directions: Floats, corners: Ints, n: int) -> Floats:
-        """Return (n,) b of Eq. 13 for one Y per tet, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T`` (Eq. 22 lacks the ⅓)."""
+        """Return (n,) b of Eq. 13, ``∫ ∇λ_i · Y = −⅓ Σ_T N_i·Y_T``, for (m, 3) vectors Y (Eq. 22 lacks the ⅓).
+
+        `corners` are the ids, below n, of the unknowns at corners, (m, 4).
+        """
         parts = np.einsum("mki,mi->mk", self.area_vectors, directions) * (self.fading * self.weights / -3)[:, None]
         return np.asarray(np.bincount(corners.ravel(), parts.ravel(), n), np.float64)
 
@@ -179,7 +189,11 @@ class Tetrahedra(TetShapes):
         return np.where(flat[:, None], 0.0, sums / (-3 * np.where(flat, 1.0, self.volumes))[:, None])
 
     def mean_gradients(self, values: Floats, corners: Ints, n: int) -> Floats:
-        """Return (n, 3) gradients at vertices: volume-weighted means over the tets with values around each, or NaN."""
+        """Return (n, 3) gradients at n unknowns, volume-weighted means over the tets around each.
+
+        `values` are (n,), and `corners` the ids of unknowns at corners, (m, 4). Tets with NaN do not count. The result
+        is NaN where none is left.
+        """
         sums = np.einsum("mki,mk->mi", self.area_vectors, values[corners]) * (self.weights / -3)[:, None]
         finite = np.isfinite(sums).all(axis=1)
         ids, volumes = corners[finite].ravel(), (self.weights * self.volumes)[finite]
@@ -189,7 +203,10 @@ class Tetrahedra(TetShapes):
 
 
 def _assemble(vectors: Floats, factors: Floats, ties: Floats, ids: Ints, n: int) -> sparse.csr_matrix:
-    """Assemble the sparse (n, n) matrix of ``Σ_T factor · N_a·N_b`` at entry (id of a, id of b), plus the ties."""
+    """Return the sparse (n, n) matrix with ``Σ_T factor · N_a·N_b`` at entry (ids of a, b), plus the ties.
+
+    Shapes are (m, 4, 3) for the area vectors N, (m,) for factors and ties, and (m, 4) for ids.
+    """
     entries = np.einsum("mai,mbi->mab", vectors, vectors) * factors[:, None, None]
     entries += ties[:, None, None] * (4.0 * np.eye(4) - 1.0)
     corners = ids.astype(np.int32)

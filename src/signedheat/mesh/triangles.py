@@ -1,7 +1,7 @@
-"""Triangles in space: areas, volumes, gradients, division; edge flips.
+"""Triangles in space: areas, volumes, gradients, division, and edge flips along creases.
 
-Marching from cell to cell cuts across the creases of a level set and leaves teeth there, although every vertex lies on
-the level. Of the two triangulations of a quadrilateral the one that bends less, ``Σ length · angle`` over its five
+Contouring cell by cell cuts across the creases of a level set and leaves teeth there, although every vertex lies on the
+level. Of the two triangulations of a quadrilateral, the one that bends less, with ``Σ length · angle`` over its five
 edges, has its diagonal along the crease.
 """
 
@@ -21,7 +21,7 @@ from .unit_vectors import unit
 
 
 class Triangles(Protocol):
-    """Triangles in space."""
+    """Protocol of triangle meshes in space."""
 
     @property
     def vertices(self) -> Floats: ...  # (n, 3) positions
@@ -38,7 +38,7 @@ class Triangles(Protocol):
 
 
 def area_vectors(triangles: Floats) -> Floats:
-    """Return (m, 3) normals of (m, 3, 3) triangles, as long as their areas."""
+    """Return (m, 3) normals of (m, 3, 3) triangles, whose lengths are the areas."""
     a, b, c = np.asarray(triangles).transpose(1, 2, 0)
     (ux, uy, uz), (vx, vy, vz) = b - a, c - a
     return np.stack([0.5 * (uy * vz - uz * vy), 0.5 * (uz * vx - ux * vz), 0.5 * (ux * vy - uy * vx)], axis=1)
@@ -62,14 +62,20 @@ def heights(triangles: Floats) -> Floats:
 
 
 def corner_normals(triangles: Floats) -> Floats:
-    """Return (3 m, 3) unit normals of (m, 3, 3) triangles, times the angle at each corner, for sums around vertices."""
+    """Return (3 m, 3) the unit normal of (m, 3, 3) triangles times the angle at each corner.
+
+    Their sums at vertices are angle-weighted vertex normals.
+    """
     sides = unit(np.roll(triangles, -1, axis=1) - triangles)
     angles = np.arccos(np.clip(-np.einsum("mki,mki->mk", sides, np.roll(sides, 1, axis=1)), -1.0, 1.0))
     return angles.reshape(-1, 1) * np.repeat(unit(area_vectors(triangles)), 3, axis=0)
 
 
 def cone_volumes(triangles: Floats, counts: Ints, groups: Ints, n: int) -> Floats:
-    """Return (n,) signed volumes between the triangles of groups, times their counts, and their centres of area."""
+    """Return (n,) signed volumes of the cones over (m, 3, 3) triangles, summed in each of n groups.
+
+    The apex is the center of area of the group, and each triangle of groups[k] counts counts[k] times.
+    """
     middles, areas = triangles.mean(axis=1), face_areas(triangles)
     centres = sums_of(middles * areas[:, None], groups, n)
     centres /= np.maximum(np.bincount(groups, areas, n), np.finfo(float).tiny)[:, None]
@@ -78,7 +84,7 @@ def cone_volumes(triangles: Floats, counts: Ints, groups: Ints, n: int) -> Float
 
 
 def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
-    """Return (m,) the connected part of each triangle, and the volume inside each part; negative for cavities."""
+    """Return (m,) the connected part of each triangle, and (p,) the volume in each part, negative for cavities."""
     parts = element_components(faces)
     first = np.unique(parts, return_index=True)[1]  # a vertex of each part as origin, so that no digits cancel far away
     corners = vertices[faces] - vertices[faces[first, 0]][parts, None]
@@ -86,34 +92,45 @@ def part_volumes(vertices: Floats, faces: Ints) -> tuple[Ints, Floats]:
 
 
 def divided_at(faces: Ints, rows: Ints, corners: Ints, points: Ints) -> Ints:
-    """Divide the faces `rows` by points on the sides that begin at given corners; return all faces, the halves last."""
+    """Divide the faces with ids `rows`, (k,), at points on one side each; return all faces, the halves last.
+
+    The divided side begins at the corner `corners`, (k,), of the face, and `points` are the ids of the points, (k,).
+    """
     a, b, c = (faces[rows, (corners + k) % 3] for k in range(3))
     halves = np.concatenate([np.stack([a, points, c], axis=1), np.stack([points, b, c], axis=1)])
     return np.concatenate([np.delete(faces, rows, axis=0), halves])
 
 
 def halved(triangles: Floats) -> Floats:
-    """Return (2 m, 3, 3) halves of triangles, cut at the middle of the longest side: first halves, then second."""
-    turn = (side_lengths(triangles).argmax(axis=1)[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(triangles, turn[:, :, None], axis=1).swapaxes(0, 1)
+    """Halve (m, 3, 3) triangles at the middle of their longest sides; return (2 m, 3, 3), first halves first."""
+    corners = (side_lengths(triangles).argmax(axis=1)[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(triangles, corners[:, :, None], axis=1).swapaxes(0, 1)
     middle = 0.5 * (a + b)
     return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
 
 
 def cut_small(triangles: Floats, small: Callable[[Floats], Bools]) -> tuple[Floats, Ints]:
-    """Halve (m, 3, 3) triangles until all parts are small; return these, part by part of each, and their originals."""
-    owners, kept, whose = np.arange(len(triangles)), [triangles[:0]], [np.arange(0)]
+    """Halve (m, 3, 3) triangles until all parts are small.
+
+    ``small(triangles)`` returns a boolean for each triangle. Returns (k, 3, 3) parts and (k,) the triangle of each,
+    ascending.
+    """
+    owners, small_parts, small_owners = np.arange(len(triangles)), [triangles[:0]], [np.arange(0)]
     while len(triangles):
         done = small(triangles)
-        kept.append(triangles[done])
-        whose.append(owners[done])
+        small_parts.append(triangles[done])
+        small_owners.append(owners[done])
         triangles, owners = halved(triangles[~done]), np.tile(owners[~done], 2)
-    order = np.argsort(np.concatenate(whose), kind="stable")
-    return np.concatenate(kept)[order], np.concatenate(whose)[order]
+    order = np.argsort(np.concatenate(small_owners), kind="stable")
+    return np.concatenate(small_parts)[order], np.concatenate(small_owners)[order]
 
 
 def gradients_along(sides: Floats, rises: Floats) -> Floats:
-    """Return (p, 3) gradients in the planes of sides (p, 2, 3) along which functions rise by (p, 2); 0 if parallel."""
+    """Return (p, 3) gradients of linear functions in planes.
+
+    Each plane is spanned by two vectors, (p, 2, 3), along which the function rises by `rises`, (p, 2). The gradient is
+    0 if they are parallel.
+    """
     normals = np.cross(sides[:, 0], sides[:, 1])
     square = np.einsum("pd,pd->p", normals, normals)
     across = rises[:, :1] * sides[:, 1] - rises[:, 1:] * sides[:, 0]
@@ -122,7 +139,11 @@ def gradients_along(sides: Floats, rises: Floats) -> Floats:
 
 @compiled
 def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
-    """Return (p,) areas, and which polygons are degenerate: without area, to roundoff, or with a repeated vertex."""
+    """Return (p,) areas of polygons, and (p,) whether they are degenerate.
+
+    Polygon f has the corners offsets[f] to offsets[f + 1] − 1. It is degenerate without area, up to rounding, or with a
+    repeated vertex.
+    """
     n = len(offsets) - 1
     areas, degenerate = np.empty(n), np.zeros(n, dtype=np.bool_)
     seen = np.full(len(vertices), -1)
@@ -150,15 +171,20 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
 
 
 AREA_ROUNDING = 1e-9
-"""Areas that differ by less than this share, or cancel up to it, are equal but for rounding."""
+"""Relative difference of areas up to which they count as equal. Larger ones are not due to rounding."""
 CREASE_ANGLE = np.deg2rad(25.0)
-"""Angle between two faces above which the edge between them may be a crease: below, the surface is smooth there."""
+"""Angle between two faces, in radians, above which the edge between them may be a crease. Below it the surface counts
+as smooth there."""
 MOST_CREASED_FACES = 4_000_000
-"""Number of faces above which creases stay as they are: the search for them would take more memory than the surface."""
+"""Number of faces above which no edges are flipped along creases, since that would take more memory than the
+surface."""
 
 
 def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = None) -> Ints:
-    """Return (m, 3) faces with edges flipped where the surface then bends less, but not at `held` vertices (n,)."""
+    """Flip edges of (m, 3) faces where the surface then bends less, and return the faces.
+
+    Edges of pairs of faces with a vertex for which `held`, (n,), is true are not flipped.
+    """
     if not 0 < len(faces) <= MOST_CREASED_FACES:
         return faces
     _, _, sharp = bent_edges(vertices, faces)
@@ -178,17 +204,21 @@ def flipped_along_creases(vertices: Floats, faces: Ints, held: Bools | None = No
 
 
 def bent_edges(vertices: Floats, faces: Ints, angle: float = CREASE_ANGLE) -> tuple[EdgeTable, Floats, Ints]:
-    """Return edges and unit normals of faces, and both halfedges of the edges at which faces bend by more than this."""
+    """Return the edges of faces, (m, 3) unit normals, and (k, 2) both halfedges of edges with a larger angle.
+
+    The `angle`, in radians, is the one between the normals of the two faces.
+    """
     table, normals = edge_table(faces), unit(area_vectors(vertices[faces]))
     first, second = normals[table.pairs // 3].swapaxes(0, 1)
     return table, normals, table.pairs[np.einsum("ij,ij->i", first, second) < np.cos(angle)]
 
 
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:
-    """Return (k,) faces to replace, (k, 3) their replacements, and the vertices of all pairs that would gain by a flip.
+    """Choose pairs of faces whose common edge ab is flipped to cd, because the surface then bends less.
 
-    No two replaced pairs are neighbours. Edge ab becomes cd unless there is such an edge; all faces around a, b and one
-    of c, d must be given, as `whole` tells.
+    No two pairs are neighbours. An edge is not flipped if there is an edge cd already. `whole`, (n,), tells vertices
+    whose faces are all given, as a, b and one of c and d must be. Returns (k,) faces to replace, (k, 3) their
+    replacements, and (j, 4) the vertices of all pairs that would gain by a flip.
     """
     table, normals, creases = bent_edges(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T
@@ -230,6 +260,6 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
 
 
 def _bend(vertices: Floats, tails: Ints, heads: Ints, first_normals: Floats, second_normals: Floats) -> Floats:
-    """Return (k,) length times the angle between the unit normals on both sides of edges."""
+    """Return (k,) lengths of edges times the angles between the unit normals, (k, 3), of the faces on both sides."""
     lengths = np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
     return lengths * np.arccos(np.clip(np.einsum("ij,ij->i", first_normals, second_normals), -1.0, 1.0))

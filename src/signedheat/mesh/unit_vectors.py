@@ -1,4 +1,4 @@
-"""Unit vectors, without underflow or overflow; axes across vectors, and angles around them."""
+"""Unit vectors without underflow or overflow, axes perpendicular to vectors, and angles around them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from ..arrays import Floats
 from ..parallel import in_threads
 
 ANGLE_ROUNDING = 1e-6
-"""Angles up to this, in radians, and differences of unit vectors, are rounding errors."""
+"""Angle, in radians, or difference of unit vectors, up to which it counts as rounding error."""
 SAME_WAY = 0.75
-"""Cosine above which two directions count as the same, 41° apart, and below whose negative as opposite ones."""
+"""Cosine of the angle between two directions above which they count as the same; it is 41°. Below the negative of it
+they count as opposite, and in between as neither."""
 
 
 def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
-    """Scale vectors to length one, first by the largest component, so that squares neither overflow nor underflow."""
+    """Scale (..., d) vectors, or complex numbers, to length 1; vectors of length 0 stay 0.
+
+    Squares neither overflow nor underflow. With `overwrite`, the result of real vectors is written to the argument.
+    """
     if np.iscomplexobj(vectors):
         length = np.abs(vectors)  # np.abs of complex numbers neither overflows nor underflows
         return vectors / np.where(length > 0, length, 1)
@@ -41,12 +45,15 @@ def unit(vectors: NDArray[Any], overwrite: bool = False) -> NDArray[Any]:
 
 
 def axes_across(vectors: Floats) -> tuple[Floats, Floats]:
-    """Return two (n, 3) unit vectors perpendicular to each vector and to each other, right-handed in this order."""
+    """Return two unit vectors, (n, 3) each, so that (vector, first, second) is a right-handed orthogonal frame."""
     first = unit(np.cross(vectors, np.eye(3)[np.abs(vectors).argmin(axis=1)]))
     return first, unit(np.cross(vectors, first))
 
 
 def angles_around(vectors: Floats, directions: Floats) -> Floats:
-    """Return (n,) angles of directions around vectors, right-handed; equal vectors have the same origin of angles."""
+    """Return (n,) angles, from −π to π, of (n, 3) directions around (n, 3) vectors as axes.
+
+    They are counter-clockwise as seen from the tip of the axis. Equal axes have the same direction of angle 0.
+    """
     first, second = axes_across(vectors)
     return np.arctan2((directions * second).sum(axis=1), (directions * first).sum(axis=1))

@@ -1,4 +1,4 @@
-"""Coincidence: points at one place, exactly or to roundoff, equal rows of numbers, and faces on the same corners."""
+"""Coincidence of points, exactly or up to rounding, of rows of numbers, and of faces with the same corners."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from .components import connected_components
 from .edges import find_edges, pair_halfedges
 
 ONE_PLACE = 4.0
-"""Largest difference between coordinates that count as one place, in units of single precision of the size of a part,
-or in last places of its coordinates."""
+"""Largest difference between coordinates of points that count as coinciding, in units of single precision of the size
+of a part, or in last places of its coordinates."""
 SEAM_UNITS, GAP_UNITS = 64.0, 1024.0
-"""Largest difference between coordinates of vertices that are joined along a seam, and of those that are reported as a
+"""Largest difference between coordinates of vertices that are welded along a seam, and of those that are reported as a
 gap, in units of single precision of the size of the surface. Halved, a vertex in a hundred is missed on two of twelve
 seams; doubled, nothing changes (`benchmarks/deciding_numbers.py`)."""
 SEAM_WIDTH = 0.25
-"""Vertices farther apart than this share of the shortest edge at them are not joined as those of a seam."""
+"""Distance of vertices, relative to the shortest edge at them, above which they are not welded along a seam."""
 MOST_REACHES = 32
-"""Parts of a mesh have at most this number of different reaches, or else these are rounded more coarsely."""
+"""Number of different reaches in `welded_within` above which reaches are rounded more coarsely."""
 _LOW = 0xFFFFFFFF
 """Mask of the low 32 bits."""
 
 
 def part_sizes(points: Floats, labels: Ints, tails: Ints, heads: Ints) -> Floats:
-    """Return (p,) the size of each connected part, given the (n,) part of each point and the (h,) halfedges.
+    """Return (p,) the size of each connected part, from the (n,) labels of points and the (h,) ends of halfedges.
 
-    The size is the longest side of the part's box, but at most √m times the geometric mean length of its edges if it
-    has m faces: a single face that reaches far beyond all others does not count.
+    The size is the longest side of the part's box. It is at most √m times the geometric mean length of its edges if it
+    has m faces, so that a single face that reaches far beyond all others does not count.
     """
     n = int(labels.max(initial=-1)) + 1
     low, high, lengths = np.full((3, n), np.inf), np.full((3, n), -np.inf), np.zeros(len(tails))
@@ -50,7 +50,7 @@ def part_sizes(points: Floats, labels: Ints, tails: Ints, heads: Ints) -> Floats
 def parts_by_place(points: Floats, tails: Ints, heads: Ints) -> tuple[Ints, Floats]:
     """Return (h,) the connected part of each halfedge, and (p,) the diagonals of the boxes around the parts.
 
-    Vertices at one place connect, also those that only rounding separates.
+    Boundary vertices that coincide up to rounding connect parts.
     """
     ids = joined_rims(points, tails, heads, ONE_PLACE)
     labels = connected_components(len(points), ids[tails], ids[heads])[ids[tails]]
@@ -62,9 +62,10 @@ def parts_by_place(points: Floats, tails: Ints, heads: Ints) -> tuple[Ints, Floa
 
 
 def tolerances(points: Floats, faces: Ints, units: float) -> Floats:
-    """Return (m,) the distance below which places on faces are one: `units` of the size of the part of each face.
+    """Return (m,) distances below which points on each face count as coinciding.
 
-    It is never less than `ONE_PLACE` last places of the coordinates of the face.
+    It is `units` times the size of the connected part of the face, and at least `ONE_PLACE` last places of the
+    coordinates of the face.
     """
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     labels = connected_components(len(points), tails, heads)
@@ -75,11 +76,12 @@ def tolerances(points: Floats, faces: Ints, units: float) -> Floats:
 
 
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
-    """Return (n,) the vertex that each is joined to, as along seams: on rims the first at its place, else itself.
+    """Weld boundary vertices that coincide, as along seams.
 
-    Rims are edges with an odd number of halfedges (h,). Two vertices are at one place if they differ by `units` of
-    single precision of the size of both their parts, or by `ONE_PLACE` last places where coordinates use all digits,
-    but never so that an edge collapses. So vertices that single precision separated are joined even if moved in double
+    Returns (n,) the vertex into which each is merged, its own index for all others. Boundary edges are those with an
+    odd number of halfedges, (h,) tails and heads. Two vertices coincide if they differ by `units` of single precision
+    of the size of both their parts, or by `ONE_PLACE` last places if coordinates use all digits, but never so that an
+    edge collapses. So vertices that rounding to single precision has separated are welded even after a move in double
     precision.
     """
     edges, _, counts, _, _ = find_edges(read_only(tails), read_only(heads), tails != heads, len(points))
@@ -105,10 +107,11 @@ def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
 
 
 def joined_copies(points: Floats, faces: Ints) -> Ints:
-    """Return (n,) the vertex that each is joined to, so that (m, 3) faces that only rounding separates are one.
+    """Weld the vertices of duplicate faces in different connected parts, which only rounding separates.
 
-    Copies are faces of different connected parts, each corner of which is at one place with one of the other's. Parts
-    stay apart of which other points lie within `SEAM_UNITS`: some of their vertices would be joined, and some not.
+    Returns (n,) the vertex into which each is merged, its own index for all others. Faces are duplicates if each corner
+    of one coincides with a corner of the other. Parts stay apart if other points of them lie within `SEAM_UNITS` of
+    each other, since then some of their vertices would be welded, and some not.
     """
     places, tails, heads = np.arange(len(points)), faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     parts = connected_components(len(points), tails, heads)
@@ -134,7 +137,10 @@ def joined_copies(points: Floats, faces: Ints) -> Ints:
 
 
 def _reaches(points: Floats, parts: Ints, tails: Ints, heads: Ints, units: float) -> Floats:
-    """Return (p, 3) the distance along each axis within which points of a part, (n,), are at one place."""
+    """Return (p, 3) the distance along each axis up to which points of each part coincide.
+
+    `parts` is the part of each point, (n,), and `tails` and `heads` are the ends of halfedges, (h,).
+    """
     used = np.flatnonzero(mask_of(len(points), tails))
     sizes, digits = part_sizes(points, parts, tails, heads), 24 if _is_single(points[used]) else 53
     last_places = _rounding(points[used], parts[used], len(sizes), digits)
@@ -160,10 +166,10 @@ def _rounding(points: Floats, parts: Ints, n: int, digits: int) -> Floats:
 
 
 def welded_within(points: Floats, reaches: Floats) -> Ints:
-    """Return (n,) the point that each is joined to, or itself, given its own reach along each axis, (n,) or (n, 3).
+    """Weld (n, 3) points that are within both points' reaches, (n,) or (n, 3) along each axis.
 
-    Two points are joined if both reach the other. Reaches are rounded to powers of four times the largest one, or of
-    larger numbers if that leaves more than `MOST_REACHES`.
+    Returns (n,) the point into which each is merged, or its own index. Reaches are rounded to powers of four times the
+    largest reach, or to powers of a larger number if that leaves more than `MOST_REACHES` different ones.
     """
     reaches = np.broadcast_to(reaches[:, None] if reaches.ndim == 1 else reaches, points.shape)
     largest = reaches.max(axis=0, initial=0.0)
@@ -185,7 +191,7 @@ def welded_within(points: Floats, reaches: Floats) -> Ints:
 def welded(points: Floats, tolerance: float | Floats) -> Ints:
     """Return (n,) the first point within `tolerance` along each axis of each of (n, 3) points, or its own index.
 
-    Chains are not followed: a point is compared only with points that stand for themselves.
+    A point is compared only with points that are not merged into others themselves, so chains of points do not merge.
     """
     return _weld(np.ascontiguousarray(points), np.maximum(np.broadcast_to(tolerance, 3), 1e-300))
 
@@ -209,14 +215,21 @@ def same_rows(rows: NDArray[np.integer]) -> Ints:
 
 
 def distinct_rows(rows: NDArray[np.integer]) -> tuple[Ints, Ints]:
-    """Return the number of each of (n, k) rows, alike for equal ones, by first appearance, and each first row."""
+    """Give numbers to the distinct rows of an (n, k) array, in order of first appearance.
+
+    Returns (n,) the number of each row, and (u,) the index of the first row with each number.
+    """
     first = same_rows(rows)
     is_first = first == np.arange(len(first))
     return (np.cumsum(is_first) - 1)[first], np.flatnonzero(is_first)
 
 
 def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
-    """Return (p,) the first face on the same corners as each, or −1 if degenerate, and whether it is reversed."""
+    """Find faces with the same corners, in the same or the reverse cyclic order.
+
+    Face f has the corners offsets[f] to offsets[f + 1] − 1. Returns (p,) the first such face of each, −1 for degenerate
+    faces, and (p,) whether the order is the reverse of that of the first.
+    """
     sizes = np.diff(offsets)
     first, reverse = np.arange(len(sizes)), np.zeros(len(sizes), dtype=bool)
     for size in np.unique(sizes).tolist():
@@ -236,7 +249,10 @@ def coincident_faces(corners: Ints, offsets: Ints) -> tuple[Ints, Bools]:
 
 @compiled
 def mixed(a: int, b: int, c: int) -> int:
-    """Return a nonnegative hash of three integers: 32-bit halves times odd numbers, so that products fit 64 bits."""
+    """Return a nonnegative hash of three integers.
+
+    Their 32-bit halves are multiplied by odd numbers, so that products fit into 64 bits.
+    """
     x = ((a & _LOW) * 0x1E3779B1) ^ ((b & _LOW) * 0x2545F491) ^ ((c & _LOW) * 0x165667B1)
     x ^= (((a >> 32) & _LOW) * 0x27D4EB2F) ^ (((b >> 32) & _LOW) * 0x1B873593) ^ (((c >> 32) & _LOW) * 0x0CC9E2D5)
     x = ((x ^ (x >> 29)) & _LOW) * 0x3C6EF373
@@ -281,9 +297,9 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
 
 @compiled
 def _cells_near(x: float, near: float, side: float) -> tuple[int, int, int]:
-    """Return the numbers of the cells of x − near, x and x + near.
+    """Return the numbers of the cells, of the given side, that contain x − near, x and x + near.
 
-    Far away, coordinates that are near each other are equal, and have one number; others may have the same one.
+    Beyond 2⁵² cells, coordinates closer than a cell are equal, and all three numbers are the same hash of x.
     """
     cell = x / side
     if abs(cell) < 2.0**52:
@@ -323,9 +339,10 @@ def _same_rows(rows: Ints) -> Ints:
 
 
 def copied_faces(faces: Ints, n_vertices: int) -> Ints:
-    """(m,) first face on the vertices of each face with an edge of more than two faces; elsewhere the face itself.
+    """Return (m,) the first face with the same vertices as each face, or the face itself.
 
-    For a face that has a vertex twice, and so no area, it is one with the same vertices, if there is one.
+    Only faces with an edge of more than two faces are compared. For a face that has a vertex twice, it is a face with
+    all of its vertices, if there is one.
     """
     first = np.arange(len(faces))
     doubled = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
