@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints, mask_of
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
-from ..errors import SourceError, UnsupportedTypeError
+from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from ..fields.field import Field
 from ..jobs import Progress
 from ..mesh.components import connected_components
@@ -138,13 +138,16 @@ def completion(
 
     pieces = None if as_oriented or own_levels else pieces_for_all(surface, flattened(kept))
 
-    def measured(solver: SignedHeatSolver[SurfaceDomain]) -> Field[SurfaceDomain]:
+    def measured(solver: SignedHeatSolver[SurfaceDomain]) -> tuple[Field[SurfaceDomain], str]:
         if as_oriented or own_levels:
-            return distance_unwarned(solver, curves, constraint)
-        field = distance_to_pieces(solver, kept, constraint, every_piece, numbers_given(kept, left_out), pieces)[0]
-        return field if left_out is None else replace(field, diagnostics=field.diagnostics.noting(left_out))
+            return distance_unwarned(solver, curves, constraint), ""
+        numbers = numbers_given(kept, left_out)
+        field, _, doubt = distance_to_pieces(solver, kept, constraint, every_piece, numbers, pieces)
+        return field if left_out is None else replace(field, diagnostics=field.diagnostics.noting(left_out)), doubt
 
-    field = on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
+    field, doubt = on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
+    if doubt:
+        warn_user(doubt, InexactWarning)
     completed = zero_set(field, curves)
     if repaired is None:
         return field, completed

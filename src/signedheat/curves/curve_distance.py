@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Literal, TypeVar
 
 import numpy as np
@@ -29,12 +30,14 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.repaired_mesh import RepairedMesh
 from ..surfaces.source_segments import as_curves, given_curves, numbers_given, segments_of
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList, SurfacePoints
+from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.surface_sharpening import distance_without_heat
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import flag
 from .gaps import Gaps
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .stroke_directions import CurvePieces, Decision, bound_as_given, decide, pieces_for_all, with_turned
+from .surroundings import Surroundings
 
 
 def warn_of_gaps(mesh: object) -> None:
@@ -116,12 +119,14 @@ def distance_to_pieces(
     every_piece: bool,
     numbers: Ints | None = None,
     pieces: CurvePieces | None = None,
-) -> tuple[Field[Surface], list[CurveOrPoints]]:
+) -> tuple[Field[Surface], list[CurveOrPoints], str]:
     """Return the signed distance, by heat, to curves that may be pieces of broken ones, and the oriented curves.
+
+    Third, the warning that the caller is to give if the answer is a guess, else "".
 
     Pieces are flipped so that they bound something together (`curve_orientation`). Pieces that bound nothing are left
     out, unless most bound nothing. Where faces cannot be oriented consistently around the curves, these are used as
-    given. An `InexactWarning` says where the answer is a guess.
+    given.
 
     Warnings and notes name curves by `numbers`, (n,), by default their indices in the list. `pieces` are the curves as
     strokes, by default on the triangles of the solver. The curves returned are those that distance was measured to.
@@ -131,16 +136,14 @@ def distance_to_pieces(
     once = triangulated_once(solver, listed)
     pieces = pieces or CurvePieces.of(surface_of(once), listed)
     if pieces is None:
-        return distance_unwarned(once, listed, constraint), listed
+        return distance_unwarned(once, listed, constraint), listed, ""
     if isinstance(solver.domain, TriangleMesh) and not has_sides(solver.domain, listed):
-        if pieces.is_piece.any():
-            warn_user(
-                "curves run where faces cannot agree which side of them is left, on a surface with one side or across "
-                "edges of more than two faces: curves were used as they are, and which side is which away from them "
-                "is a guess. Leave out faces, or close the curves",
-                InexactWarning,
-            )
-        return distance_unwarned(once, listed, constraint), listed
+        doubt = (
+            "curves run where faces cannot agree which side of them is left, on a surface with one side or across "
+            "edges of more than two faces: curves were used as they are, and which side is which away from them "
+            "is a guess. Leave out faces, or close the curves"
+        )
+        return distance_unwarned(once, listed, constraint), listed, doubt if pieces.is_piece.any() else ""
     decision = decide(pieces, every_piece)
     turn = decision.turned(len(listed))
     left_out = pieces.curves(decision.loose)
@@ -167,9 +170,7 @@ def distance_to_pieces(
             f"what goes round, but bounds nothing with the others, was left out: {named(loops)}. every_piece=True "
             "takes all curves"
         )
-    if reason:
-        warn_user(reason, InexactWarning)
-    return field, used
+    return field, used, reason
 
 
 def closing_curves(field: Field[Surface], curves: Sequence[CurveOrPoints], least: float) -> list[Curve]:
@@ -320,29 +321,51 @@ def distance_to_curves(
     is_default = intrinsic == "auto"
     numbers = numbers_given(listed, left_out)
 
-    def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints | None]:
+    def completed(
+        by: SignedHeatSolver[Any], curves: CurvesAndPoints, pieces: CurvePieces | None
+    ) -> tuple[Field[AnySurface], CurvesAndPoints, str]:
+        """Return the field by heat, the curves to sharpen it to, and why it is a guess, "" if it is none."""
+        if as_oriented:
+            return distance_unwarned(by, curves, constraint), curves, ""
+        return distance_to_pieces(by, curves, constraint, every_piece, numbers, pieces)
+
+    def measured(by: SignedHeatSolver[Any]) -> tuple[Field[AnySurface], CurvesAndPoints | None, str]:
         """Return the field by a solver, and the curves to sharpen it to; None for these if it is exact already."""
         flat = flattened(listed)
         by = triangulated_once(by, flat)
-        surface_of(by).segments(flat)  # refuses curves that do not fit
+        segments = surface_of(by).segments(flat)  # refuses curves that do not fit
         pieces = None
         if not as_oriented:
             pieces = CurvePieces.of(surface_of(by), flat) if is_default else pieces_for_all(solver.domain, flat)
         if pieces is None or bound_as_given(pieces):
             exact = distance_by_sides(by, given, progress)
             if exact is not None:
-                return exact, None
-        if as_oriented:
-            return distance_unwarned(by, given, constraint), listed
-        return distance_to_pieces(by, listed, constraint, every_piece, numbers, pieces)
+                return exact, None, ""
+        if as_oriented and left_out is not None:  # warnings call curves by their numbers among those given
+            return completed(by, given, pieces)
+        near = Surroundings.of(by.domain, list(chain(*segments))) if is_default and on_its_triangles(by) else None
+        if near is not None:
+            field, curves, doubt = completed(replace(by, domain=near.part), near.on_part(listed), None)
+            extended = near.extended(field)
+            if extended is not None:
+                return extended, near.on_whole(curves), doubt
+        return completed(by, listed, pieces)
 
-    field, used = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
+    field, used, doubt = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
+    if doubt:
+        warn_user(doubt, InexactWarning)
     sharpened = field if used is None else sharpen(field, used, progress=within(progress, 0.7, 1.0))
     if used is None and progress is not None:
         progress(1.0, "done")
     if repaired is not None:
         sharpened = repaired.on_given(sharpened)
     return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))
+
+
+def on_its_triangles(solver: SignedHeatSolver[Any]) -> bool:
+    """Whether the solver takes the triangles of a mesh as they are, for all curves."""
+    made = solver.discretization
+    return isinstance(solver.domain, TriangleMesh) and isinstance(made, SurfaceDiscretization) and not made.transfer
 
 
 def distance_by_sides(

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import Diagnostics, Note
-from ..errors import ConstraintError, UnsupportedTypeError
+from ..errors import ConstraintError, InexactWarning, UnsupportedTypeError, warn_user
 from ..fields.field import Field
 from ..fields.solid_queries import Closest
 from ..grids.grid import RESOLUTION, Grid
@@ -211,11 +211,13 @@ def strokes_that_agree(
     size = float(np.ptp(bounds, axis=0).max())
     sheet = _triangles_around((bounds - bounds[0]) / size)
     curves = [sheet.polyline(np.pad((line.points - bounds[0]) / size, ((0, 0), (0, 1))), line.closed) for line in lines]
-    field, _ = on_resolving_triangles(
+    field, _, doubt = on_resolving_triangles(
         lambda solver: distance_to_pieces(solver, curves, None, every_piece, np.array(numbers)),
         SignedHeatSolver(sheet, 1.0, progress),
         curves,
     )
+    if doubt:
+        warn_user(doubt, InexactWarning)
     note = field.diagnostics.note(CurvesTaken)
     if note is None:
         return list(lines), None
