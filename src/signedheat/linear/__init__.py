@@ -1,4 +1,4 @@
-"""Sparse linear solvers: one module for each factorisation back end, the choice between them, and Krylov methods."""
+"""Sparse linear solvers: a module for each back end of factorisation, the choice between them, and Krylov methods."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Factor(Protocol):
 
     @property
     def n(self) -> int: ...  # number of unknowns
-    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]: ...  # for one right-hand side (n,) or several (n, k)
+    def solve(self, rhs: NDArray[Any]) -> NDArray[Any]: ...  # solutions for one (n,) or several (n, k) right-hand sides
 
 
 def available_backends() -> list[str]:
@@ -42,7 +42,10 @@ def available_backends() -> list[str]:
 
 
 def chosen_backend(backend: str | None = None) -> str:
-    """Return the name of the back end that `factorize` takes."""
+    """Return the name of the back end that `factorize` uses; raise an error if it is not available.
+
+    It is the argument, else that of the environment variable ``SIGNEDHEAT_BACKEND``, else the fastest.
+    """
     available = available_backends()
     name = backend or os.environ.get("SIGNEDHEAT_BACKEND") or available[0]
     if name not in available:
@@ -61,10 +64,9 @@ def factorize(
 ) -> Factor:
     """Factorise a sparse Hermitian positive definite matrix, float64 or complex128; only its upper triangle is read.
 
-    The back end is by default that of the environment variable ``SIGNEDHEAT_BACKEND``, or the fastest. ``order[k]`` is
-    eliminated k-th. If many systems will be solved (`reused`), PARDISO finds an order with which it uses all cores. If
-    `like` is the factor of a matrix with entries at the same places, this takes half the time, and both factors share
-    the memory of one.
+    The back end is chosen as by `chosen_backend`. Unknown ``order[k]`` is eliminated k-th. If many systems will be
+    solved, set `reused`, so that PARDISO chooses an order with which it uses all cores. If `like` is the factor of a
+    matrix with the same sparsity pattern, PARDISO takes half the time, and both factors share the memory of one.
     """
     name = chosen_backend(backend)
     upper = upper_triangle(matrix)

@@ -20,12 +20,12 @@ def conjugate_gradients(
     limit: int = 500,
     converged: Callable[[Floats, Floats], bool] | None = None,
 ) -> Floats:
-    """Solve ``A x = b`` for each column of b, (n,) or (n, k), A symmetric and positive definite, or b within its
-    range.
+    """Solve ``A x = b`` for each column of b, (n,) or (n, k), by preconditioned conjugate gradients.
 
-    Preconditioned conjugate gradients (Hestenes & Stiefel 1952), `precondition` P about A⁻¹. A column is done once ``rᵀ
-    P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P b)``, or if ``pᵀ A p ≤ 0``; all are done after `limit`
-    steps, or once ``converged(x, r)``.
+    `operator` applies A, which is symmetric positive definite, or semidefinite with b in its range. `precondition`
+    applies P, an approximation of A⁻¹. A column ends at residual r once ``rᵀ P r ≤ tolerance² · max(r₀ᵀ P r₀, bᵀ P
+    b)``, or if ``pᵀ A p ≤ 0`` for its direction p. All end after `limit` steps, or once ``converged(x, r)`` is true
+    (Hestenes & Stiefel 1952).
     """
     apply_p = precondition or np.copy
     x = np.zeros_like(rhs) if start is None else start.copy()
@@ -55,6 +55,6 @@ def conjugate_gradients(
 
 
 def _products(a: Floats, b: Floats) -> Floats:
-    """Return (k,) inner products of columns, or one number for two vectors."""
+    """Return (k,) inner products of the columns of two (n, k) arrays, or a number for two vectors."""
     # not by BLAS, whose threads wait busily for more work
     return np.asarray(np.einsum("i...,i...->...", a, b))

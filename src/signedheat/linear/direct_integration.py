@@ -1,6 +1,7 @@
-"""Step 3 by a factorisation of C: unknowns at the vertices of a mesh, constraints at any sample points.
+"""Step 3 of the method by a factorisation of C, for unknowns at the vertices of a mesh.
 
-Constraints are exact, or imposed by springs where a linear function cannot satisfy them without becoming flat.
+Constraints at sample points are imposed exactly or, where a linear function cannot satisfy them without becoming flat,
+by springs, that is, by quadratic penalties.
 """
 
 from __future__ import annotations
@@ -20,9 +21,10 @@ from . import Factor, PardisoFactor, factorize, upper_triangle, whole
 from .conjugate_gradients import conjugate_gradients
 
 STIFFEST_SPRING = 1e10
-"""Strength of springs, relative to C, above which, and below whose inverse, it makes no difference beyond rounding."""
+"""Strength of springs, relative to C, above which it makes no difference beyond rounding. Below the inverse of it,
+springs are left out."""
 COLUMNS_AT_ONCE = 32
-"""Right-hand sides solved at a time."""
+"""Number of right-hand sides that are solved at a time, which bounds the memory."""
 PIN_STIFFNESS = 1e6
 """Stiffness of the springs at vertices on the source, relative to the largest diagonal entry of C."""
 LEAST_STIFFNESS = 10.0
@@ -31,19 +33,19 @@ LEAST_STIFFNESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class DirectIntegration(Frozen):
-    """Solver of ``C φ = b`` on vertices, with the constraints of Sec. 7.1; derived classes define `fit`."""
+    """Solver of ``C φ = b`` with n unknowns, with the constraints of Sec. 7.1; derived classes define `fit`."""
 
     stiffness: sparse.csr_matrix  # (n, n) upper triangle of C, whose kernel are the constants on each component
-    factorize: Callable[..., Factor] = factorize  # of an upper triangle; takes the last `PardisoFactor` as `like`
+    factorize: Callable[..., Factor] = factorize  # takes an upper triangle, and a `PardisoFactor` as `like`
     spring: float = 1e8
-    """ρ of the augmented Lagrangian behind exact constraints, relative to the largest diagonal entry of C: larger ones
-    need fewer rounds, and worsen the condition of the matrix."""
+    """ρ of the augmented Lagrangian for exact constraints, relative to the largest diagonal entry of C. A larger one
+    needs fewer rounds, and worsens the condition of the matrix."""
     _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
     _of_this_pattern: LastUsed[bytes, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
 
     @cached_property
     def components(self) -> Ints:
-        """(n,) connected component of the domain that each unknown lies in."""
+        """Connected component of the domain in which each unknown lies, (n,) int."""
         labels: NDArray[np.int32] = sparse.csgraph.connected_components(self.stiffness, directed=False)[1]
         return labels.astype(np.int64)
 
@@ -53,16 +55,16 @@ class DirectIntegration(Frozen):
         return self.factorize(_grounded(self.stiffness, self._first_vertices))
 
     def solve(self, divergence: Floats, source: SourceTerm) -> Floats:
-        """Minimise ∫|∇φ − Y|² with nothing imposed: ``C φ = b`` (Eq. 13)."""
+        """Minimise ∫|∇φ − Y|² without constraint, by solving ``C φ = b`` (Eq. 13)."""
         return self.solve_many([divergence], [source])[0]
 
     def solve_many(self, divergences: Iterable[Floats], sources: Sequence[SourceTerm]) -> list[Floats]:
-        """Solve for several sources at once."""
+        """Return the result of `solve` for each of several sources, computed together."""
         solved = self.factor.solve(np.stack(list(divergences)).T)
         return [self._centered(values, source) for values, source in zip(solved.T, sources, strict=True)]
 
     def fit_exactly(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Impose levels, up to one constant for each group, at every sample (Eq. 14)."""
+        """Solve with levels imposed exactly at every sample, up to one constant for each group (Eq. 14)."""
         rows, values = source.interpolation, levels.values
         if levels.groups is None:
             fitted, _ = self._interpolate(rows, divergence[:, None], values[:, None])
@@ -88,7 +90,10 @@ class DirectIntegration(Frozen):
         return self._centered(fitted[:, 0], source)
 
     def penalize(self, divergence: Floats, source: SourceTerm, strength: float) -> Floats:
-        """Solve ``(C + λ Aᵀ W A) φ = b`` (Sec. 7.1, Fig. 11), W the line or area elements, up to λ = ∞."""
+        """Solve ``(C + λ Aᵀ W A) φ = b``, W the line or area elements of samples (Sec. 7.1, Fig. 11).
+
+        The strength λ may be arbitrarily small or large.
+        """
         rows, stiffest = source.interpolation, float(self.stiffness.diagonal().max())
         if strength * float(source.weights.sum()) < stiffest / STIFFEST_SPRING:
             return self.solve(divergence, source)
@@ -96,18 +101,19 @@ class DirectIntegration(Frozen):
         return self._reached(self._pulled_factor(rows, strength * source.weights).solve(divergence), rows)
 
     def anchored(self, source: SourceTerm) -> Factor:
-        """Factor of C with φ held at zero along the source."""
+        """Return the factor of C with springs that hold φ at zero along the source."""
         return self._pulled_factor(source.interpolation, self.springs(source))
 
     def springs(self, source: SourceTerm) -> Floats:
-        """(s,) stiffness of the springs that hold φ at the samples."""
+        """Return (s,) stiffnesses of the springs that hold φ at the samples."""
         return np.full(len(source.weights), self.spring * self.stiffness.diagonal().max())
 
     def _interpolate(self, rows: sparse.csr_matrix, forces: Floats, levels: Floats) -> tuple[Floats, Floats]:
-        """Minimise ``½ φᵀ C φ − fᵀ φ`` where ``A φ = l``: φ, and the multipliers μ of ``C φ + Aᵀ μ = f`` (Eq. 14).
+        """Minimise ``½ φᵀ C φ − fᵀ φ`` under the constraints ``A φ = l`` (Eq. 14), for k columns at once.
 
-        ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and two or three rounds from the true residuals
-        suffice. If rows are nearly dependent, conjugate gradients close the gaps, unless the levels contradict.
+        A are the `rows`, (s, n), f the `forces`, (n, k), and l the `levels`, (s, k). Returns φ and the multipliers μ of
+        ``C φ + Aᵀ μ = f``. ``C + ρ Aᵀ A`` is definite even if rows of A are dependent, and two or three rounds from the
+        true residuals suffice. If rows are nearly dependent, conjugate gradients are used in addition.
         """
         stiffness = whole(self.stiffness)
         spring = self.spring * self.stiffness.diagonal().max()
@@ -135,11 +141,12 @@ class DirectIntegration(Frozen):
         return values, multipliers
 
     def _pulled_factor(self, rows: sparse.csr_matrix, springs: Floats) -> Factor:
-        """Return the factor of ``C + Aᵀ S A``, A the rows and S the springs; the last one is kept."""
+        """Return the factor of ``C + Aᵀ S A``, A the rows and S = diag(springs); the last factor is cached."""
         key = fingerprint(rows.indptr, rows.indices, rows.data, springs)
         return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
 
     def _factorize_pulled(self, rows: sparse.csr_matrix, springs: Floats) -> Factor:
+        """Compute the factor of `_pulled_factor`, in the memory of an earlier one of the same pattern if possible."""
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.components[self._first_vertices], self._component_of(rows[springs > 0]), invert=True)
         matrix = _grounded(matrix, self._first_vertices[unreached])
@@ -150,19 +157,19 @@ class DirectIntegration(Frozen):
 
     @cached_property
     def _first_vertices(self) -> Ints:
-        """The first vertex of each connected component."""
+        """Least unknown of each connected component, (p,) int."""
         return np.unique(self.components, return_index=True)[1]
 
     def _component_of(self, rows: sparse.csr_matrix) -> Ints:
-        """(s,) connected component of the domain that each sample lies in."""
+        """Return (s,) the connected component of the domain in which the sample of each row of A lies."""
         return self.components[rows.indices[rows.indptr[:-1]]]
 
     def _reached(self, values: Floats, rows: sparse.csr_matrix) -> Floats:
-        """Put NaN on connected components without samples."""
+        """Replace (n,) values by NaN on connected components without samples; samples are the rows of A."""
         return np.where(np.isin(self.components, self._component_of(rows)), values, np.nan)
 
     def _centered(self, values: Floats, source: SourceTerm) -> Floats:
-        """Shift φ to a weighted mean of zero over the samples of each connected component; NaN on those without any."""
+        """Shift φ, (n,), to a weighted mean of 0 over the samples of each connected component, NaN without samples."""
         rows = source.interpolation
         part, n_parts = self._component_of(rows), len(self._first_vertices)
         weight = np.bincount(part, source.weights, n_parts)
@@ -172,12 +179,15 @@ class DirectIntegration(Frozen):
         return values - mean[self.components]
 
     def _at_samples(self, values: Floats, source: SourceTerm) -> Floats:
-        """Interpolate φ at the (s,) samples of the source."""
+        """Return (s,) values of φ, (n,), interpolated at the samples of the source."""
         return source.interpolation @ values
 
 
 def _grounded(matrix: sparse.csr_matrix, vertices: Ints) -> sparse.csr_matrix:
-    """Make the matrix definite by larger entries at one vertex of each component, where the solution is then zero."""
+    """Make an upper triangle definite by doubling the diagonal entries of some unknowns, one of each component.
+
+    The solution is zero at these unknowns if the right-hand side sums to zero on each component.
+    """
     data = matrix.data.copy()
     diagonal = matrix.indptr[vertices]
     data[diagonal] += np.where(data[diagonal] > 0, data[diagonal], 1.0)
@@ -185,7 +195,10 @@ def _grounded(matrix: sparse.csr_matrix, vertices: Ints) -> sparse.csr_matrix:
 
 
 def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Floats, allowed: float) -> None:
-    """Refuse levels that φ misses at some sample by more than is allowed, unless all levels are the same."""
+    """Raise `ConstraintError` if φ misses a level at some sample by more than `allowed`, unless all levels are equal.
+
+    `rows` interpolate φ at samples, (s, n), `levels` are (s,), and `values` are φ, (n,).
+    """
     gap = np.abs(levels - rows @ values)
     worst = int(gap.argmax())
     if np.ptp(levels) > 0 and gap[worst] > allowed:
@@ -198,19 +211,19 @@ def refuse_contradictions(rows: sparse.csr_matrix, levels: Floats, values: Float
 
 @dataclass(frozen=True, eq=False)
 class SpringIntegration(DirectIntegration):
-    """`DirectIntegration` with a `fit` by springs: exact levels inside cells would make φ constant near the source."""
+    """`DirectIntegration` with a `fit` by springs; exact levels inside cells would make φ constant near the source."""
 
-    strength: float = 0.0  # of the springs, in 1/length
+    strength: float = 0.0  # strength of the springs, in 1/length
 
     @property
     def soft_weight(self) -> float:
-        """λ of `Soft` where none is given, in 1/length."""
+        """Default weight λ of the constraint `Soft`, in 1/length."""
         return self.strength
 
     def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, S the `springs`, also over constants of groups."""
-        places, springs = self.held(source)
-        rows, levels = sparse.csr_matrix(places @ source.interpolation), levels.at(places)
+        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, S the `springs`, and also over constants of groups."""
+        averages, springs = self.held(source)
+        rows, levels = sparse.csr_matrix(averages @ source.interpolation), levels.at(averages)
         if levels.groups is not None:
             springs = np.where(np.bincount(levels.groups)[levels.groups] > 1, springs, 0.0)
         factor = self._pulled_factor(rows, springs)
@@ -221,14 +234,14 @@ class SpringIntegration(DirectIntegration):
         held = springs > 0
         groups, parts = levels.groups[held], self._component_of(rows[held])
         first = groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
-        others = np.setdiff1d(groups, first)
-        if len(others):
-            chosen = np.flatnonzero(np.isin(levels.groups, others))
-            entries = np.ones(len(chosen)), (chosen, np.searchsorted(others, levels.groups[chosen]))
-            members = sparse.csr_matrix(entries, shape=(len(springs), len(others)))
+        free = np.setdiff1d(groups, first)
+        if len(free):
+            chosen = np.flatnonzero(np.isin(levels.groups, free))
+            entries = np.ones(len(chosen)), (chosen, np.searchsorted(free, levels.groups[chosen]))
+            members = sparse.csr_matrix(entries, shape=(len(springs), len(free)))
             forces = sparse.csr_matrix(members.T @ sparse.diags_array(springs))
-            balance = np.empty((len(others), len(others)))
-            for begin in range(0, len(others), COLUMNS_AT_ONCE):
+            balance = np.empty((len(free), len(free)))
+            for begin in range(0, len(free), COLUMNS_AT_ONCE):
                 lifted = members[:, begin : begin + COLUMNS_AT_ONCE].toarray()
                 balance[:, begin : begin + COLUMNS_AT_ONCE] = forces @ (lifted - rows @ factor.solve(pull @ lifted))
             constants = np.linalg.lstsq(balance, forces @ (rows @ fitted - values), rcond=None)[0]
@@ -236,19 +249,22 @@ class SpringIntegration(DirectIntegration):
         return self._centered(fitted, source)
 
     def anchored(self, source: SourceTerm) -> Factor:
-        """Factor of C with φ held at zero along the source, however small a part of it lies in the domain."""
+        """Return the factor of C with springs that hold φ at zero along the source.
+
+        Their total stiffness is at least `LEAST_STIFFNESS`, however small a part of the source lies in the domain.
+        """
         springs, least = self.springs(source), LEAST_STIFFNESS * float(self.stiffness.diagonal().max())
         return self._pulled_factor(source.interpolation, springs * max(1.0, least / float(springs.sum())))
 
     def held(self, source: SourceTerm) -> tuple[sparse.csr_matrix, Floats]:
-        """Return an (r, s) matrix that averages samples to the places of the springs of `fit`, and (r,) stiffnesses."""
+        """Return an (r, s) matrix that averages samples to the points at which `fit` has springs, and stiffnesses."""
         return sparse.eye_array(len(source.weights), format="csr"), self.springs(source)
 
     def springs(self, source: SourceTerm) -> Floats:
-        """(s,) stiffness of the springs: stiff for samples at vertices, soft for those inside cells."""
+        """Return (s,) stiffnesses of springs at samples, which are large at vertices and smaller inside cells."""
         at_vertex = np.diff(source.interpolation.indptr) == 1
         return np.where(at_vertex, PIN_STIFFNESS * self.stiffness.diagonal().max(), self.strength * source.weights)
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
-        """Return the levels imposed on the linear interpolant of φ, and the φ that `solve` finds for them."""
+        """Return the levels to impose on the linear interpolant of φ, and φ, ``solve(levels)``, for them."""
         return levels, solve(levels)

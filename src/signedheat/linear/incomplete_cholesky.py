@@ -1,7 +1,7 @@
 """Incomplete Cholesky factors without fill, IC(0), as preconditioners of conjugate gradients.
 
-They are for systems too large to factorise: a factor takes as much memory as half the matrix, and the time per
-iteration is linear.
+They are for systems that are too large to factorise. A factor takes as much memory as half the matrix, and the time of
+an iteration is linear in the number of entries.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from .threads import one_blas_thread
 class IncompleteCholesky:
     """A symmetric positive definite matrix with its IC(0) factor, in a chosen order of unknowns."""
 
-    order: Ints  # (k,) unknowns to solve for, in this order; all others stay zero
-    matrix: sparse.csr_matrix  # (k, k) rows and columns in that order
+    order: Ints  # (k,) unknowns to solve for, in this order; all others are zero in the solution
+    matrix: sparse.csr_matrix  # (k, k) the matrix, with rows and columns in that order
     factor: sparse.csr_matrix  # (k, k) strictly lower triangle of the factor
     pivots: Floats  # (k,) inverse diagonal of the factor
     n: int  # number of unknowns, solved for or not
 
     @classmethod
     def of(cls, matrix: sparse.csr_matrix, order: Ints) -> IncompleteCholesky:
-        """Factorise a matrix; if a pivot is not positive, start again with a larger diagonal (Manteuffel 1980)."""
+        """Factorise a matrix; if a pivot is not positive, begin anew with a larger diagonal (Manteuffel 1980)."""
         chosen = sparse.csr_matrix(matrix[order][:, order])
         factor = sparse.csr_matrix(sparse.tril(chosen, -1))
         factor.sort_indices()
@@ -44,11 +44,11 @@ class IncompleteCholesky:
             shift = max(1e-3, 2 * shift)
 
     def solve(self, rhs: ArrayLike, relative: float = 1e-10, componentwise: float = 0.0) -> Floats:
-        """Solve for columns b, (n,) or (n, k), until ``‖r‖ ≤ relative · ‖b‖`` or ``|r_i| ≤ componentwise · A_ii
-        |x_i|``.
+        """Solve for right-hand sides b, (n,) or (n, k), by preconditioned conjugate gradients.
 
-        The second criterion keeps solutions accurate that decay by hundreds of orders of magnitude, if `order` follows
-        the decay.
+        It ends once the residual r satisfies ``‖r‖ ≤ relative · ‖b‖`` or, in every row i, ``|r_i| ≤ componentwise ·
+        A_ii |x_i|``. The second criterion keeps solutions accurate that decay by hundreds of orders of magnitude, if
+        `order` follows the decay.
         """
         b = np.asarray(rhs, dtype=np.float64)
         x = np.zeros((self.n, b[0].size))
@@ -59,7 +59,7 @@ class IncompleteCholesky:
         return x.reshape(b.shape)
 
     def _iterate(self, load: Floats, relative: float, componentwise: float) -> Floats:
-        """Solve for columns (k, c) whose rows are in the order of the factor."""
+        """Solve for the columns of `load`, (k, c), whose rows are in the order of the factor."""
         shape, goal = load.shape, relative**2 * float(np.einsum("ij,ij->", load, load))
         diagonal, factor = self.matrix.diagonal(), self.factor
 
@@ -82,7 +82,7 @@ class IncompleteCholesky:
 
 
 def outward_order(matrix: sparse.csr_matrix, seeds: Ints) -> Ints:
-    """Return the unknowns connected to the seeds in the graph of a matrix, in order of distance from them."""
+    """Return the unknowns connected to the seeds in the graph of a matrix, in breadth-first order from the seeds."""
     n = matrix.shape[0]
     links = sparse.csr_matrix((np.ones(len(seeds)), (np.full(len(seeds), n), seeds)), shape=(n + 1, n + 1))
     graph = sparse.csr_matrix((matrix.data != 0, matrix.indices, matrix.indptr), shape=matrix.shape)
@@ -92,7 +92,7 @@ def outward_order(matrix: sparse.csr_matrix, seeds: Ints) -> Ints:
 
 
 def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
-    """Factorise a matrix given by its upper triangle, in order of distance from the first unknown of each component."""
+    """Factorise a matrix, given by its upper triangle, in breadth-first order from the least unknown of each part."""
     full = whole(upper)
     _, first = np.unique(sparse.csgraph.connected_components(full, directed=False)[1], return_index=True)
     return IncompleteCholesky.of(full, outward_order(full, first))
@@ -100,7 +100,11 @@ def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
 
 @compiled
 def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats) -> bool:
-    """Compute IC(0) in place; `pivots` becomes its inverse diagonal. Return whether all pivots are positive."""
+    """Compute the IC(0) factor in place, and return whether all pivots are positive.
+
+    `factor` has the strictly lower triangle by rows, and `pivots` the diagonal, which becomes the inverse diagonal of
+    the factor.
+    """
     for i in range(len(pivots)):
         own = pivots[i]
         rest = own
@@ -130,7 +134,7 @@ def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Fl
 def _precondition(
     indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats, r: Floats
 ) -> Floats:
-    """Return z = (L Lᵀ)⁻¹ r, row by row down and up."""
+    """Return z = (L Lᵀ)⁻¹ r, by forward and backward substitution, for r of shape (n, c)."""
     n, width = r.shape
     z = np.empty((n, width))
     for i in range(n):
@@ -152,7 +156,10 @@ def _precondition(
 
 @compiled
 def _settled(diagonal: Floats, x: Floats, r: Floats, componentwise: float) -> bool:
-    """Return whether every row's residual is small compared with its own unknowns."""
+    """Return whether the residual of every row i is at most `componentwise` times ``A_ii |x_i|``.
+
+    `x` and `r` are (n, c). The largest entry of a row in any column counts.
+    """
     n, width = x.shape
     for i in range(n):
         largest, residual = 0.0, 0.0

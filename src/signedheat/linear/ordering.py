@@ -1,4 +1,4 @@
-"""Sparse Hermitian matrices by their upper triangle, and fill-reducing elimination orders of those on surfaces."""
+"""Upper triangles of sparse Hermitian matrices, and fill-reducing elimination orders for matrices on surfaces."""
 
 from __future__ import annotations
 
@@ -13,17 +13,20 @@ from ..compiled import compiled
 
 
 def elimination_order(upper: Any) -> Ints:
-    """Order unknowns of a sparse symmetric matrix by nested dissection, for surfaces; ``order[k]`` is the k-th."""
+    """Return (n,) an order of the unknowns of a sparse matrix by nested dissection; ``order[k]`` is eliminated k-th.
+
+    It suits matrices on surfaces, whose separators are small. `upper` is the upper triangle.
+    """
     graph = whole(upper)
     return _dissect(graph.indptr, graph.indices)
 
 
 @compiled
 def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
-    """Order both sides of a small separator, each in the same way, then the separator, in one partitioned array.
+    """Return (n,) an order of the nodes of a graph: both sides of a small separator, each in this way, then itself.
 
-    A separator is the smallest level near the middle of a breadth-first search from the end of a long path (George
-    1973).
+    The neighbours of node i are those from starts[i] to starts[i + 1] − 1. A separator is the smallest level near the
+    middle of a breadth-first search from the end of a long path (George 1973).
     """
     n = len(starts) - 1
     order = np.arange(n)
@@ -113,7 +116,10 @@ def _levels(
     queue: Ints,
     begin: int,
 ) -> int:
-    """Search a region breadth first, into the queue from `begin` on; return the end of the queue."""
+    """Search the nodes whose region is `current` breadth first from a seed, and return the end of the queue.
+
+    The nodes are written to the queue from `begin` on, and their distances from the seed to `level`.
+    """
     level[seed] = 0
     queue[begin] = seed
     head, tail = begin, begin + 1
@@ -131,7 +137,10 @@ def _levels(
 
 @compiled
 def _thinnest(level: Ints, queue: Ints, reached: int, last: int) -> int:
-    """Return the smallest level that leaves at least 40 % of the unknowns on either side, or the median level."""
+    """Return the level with the fewest nodes that has at least 40 % of the nodes on either side, or the median level.
+
+    `queue` has the `reached` nodes sorted by level, from 0 to `last`.
+    """
     best, size, median = -1, reached, level[queue[reached // 2]]
     p = 0
     while p < reached:
@@ -147,7 +156,10 @@ def _thinnest(level: Ints, queue: Ints, reached: int, last: int) -> int:
 
 
 def upper_triangle(matrix: Any) -> sparse.csr_matrix:
-    """Return the upper triangle, diagonal included, as sorted CSR, of a Hermitian matrix or its upper triangle."""
+    """Return the upper triangle of a Hermitian matrix, with all diagonal entries stored, as CSR with sorted indices.
+
+    The argument may be the upper triangle itself.
+    """
     if sparse.issparse(matrix) and matrix.format == "csr" and _is_upper(matrix):
         return matrix
     upper = sparse.triu(matrix, format="csr")

@@ -22,9 +22,12 @@ from ..errors import FactorizationError, UnsupportedTypeError
 from ..jobs import interruptible
 
 _ANALYZE, _FACTORIZE, _SOLVE, _RELEASE = 11, 22, 33, -1
+"""Phases of PARDISO."""
 _POSITIVE_DEFINITE = {np.dtype(np.float64): 2, np.dtype(np.complex128): 4}
+"""Matrix types of PARDISO for positive definite matrices."""
 LONGEST_WAIT = 1
-"""Milliseconds for which MKL's threads wait busily for more work; by default 200, in which others could compute."""
+"""Milliseconds for which MKL's threads wait busily for more work before they sleep. MKL's default of 200 keeps other
+threads from computing."""
 _CAUSES = {
     -1: "inconsistent input",
     -2: "not enough memory",
@@ -35,7 +38,10 @@ _CAUSES = {
 
 
 class PardisoFactor:
-    """Cholesky factor of a Hermitian positive definite matrix; without an order, METIS finds one."""
+    """Cholesky factor of a Hermitian positive definite matrix, given by its upper triangle.
+
+    Unknown ``order[k]`` is eliminated k-th; without an order, METIS finds one.
+    """
 
     backend = "pardiso"
 
@@ -43,7 +49,7 @@ class PardisoFactor:
         self._take(_Analysis(upper, order), upper)
 
     def _take(self, analysis: _Analysis, upper: sparse.csr_matrix) -> None:
-        """Factorise in the memory of an analysis."""
+        """Initialise this factor for a matrix, in the memory of an analysis of its pattern."""
         self.n: int = upper.shape[0]
         self.dtype: np.dtype[Any] = upper.dtype
         self._analysis, self._values = analysis, upper.data
@@ -51,16 +57,20 @@ class PardisoFactor:
             analysis.factorize(self._values)
 
     def like_this(self, upper: sparse.csr_matrix) -> PardisoFactor | None:
-        """Factorise a matrix in the memory of this factor; return None if its entries are elsewhere or MKL cannot."""
+        """Return the factor of a matrix in the memory of this one.
+
+        Returns None if the matrix has another sparsity pattern, or if this version of MKL cannot.
+        """
         return self._again(upper) if self._analysis.fits(upper) and _makes_factors_anew() else None
 
     def _again(self, upper: sparse.csr_matrix) -> PardisoFactor:
+        """Return the factor of a matrix of the same pattern, in the memory of this one."""
         factor = object.__new__(PardisoFactor)
         factor._take(self._analysis, upper)
         return factor
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solve for one right-hand side (n,) or several (n, k)."""
+        """Return the solutions for one right-hand side, (n,), or several, (n, k)."""
         columns = np.asfortranarray(rhs, dtype=self.dtype)
         solution = np.empty_like(columns, order="F")
         with self._analysis.lock:
@@ -70,7 +80,7 @@ class PardisoFactor:
 
     @property
     def nonzeros(self) -> int:
-        """Entries stored in the factor."""
+        """Number of entries stored in the factor."""
         return int(self._analysis.call.parameters[17])
 
     def __reduce__(self) -> NoReturn:
@@ -81,7 +91,7 @@ class PardisoFactor:
 
 
 class _Analysis:
-    """The order and the memory of one factor, which matrices with entries at the same places share."""
+    """The order and the memory of a factor, which matrices of the same sparsity pattern share."""
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
         self.call = _Call(upper, order)
@@ -91,7 +101,7 @@ class _Analysis:
         self.call(_ANALYZE)
 
     def factorize(self, values: NDArray[Any]) -> None:
-        """Factorise the matrix with these values, unless its factor is the one in memory."""
+        """Factorise the matrix with these entries, unless its factor is in memory already."""
         if self._made is values:
             return
         self._made, self.call.values = None, values
@@ -99,14 +109,14 @@ class _Analysis:
         self._made = values
 
     def fits(self, upper: sparse.csr_matrix) -> bool:
-        """Return whether a matrix has entries at the same places."""
+        """Return whether a matrix has the same type and sparsity pattern."""
         call = self.call
         same = upper.dtype == call.values.dtype and len(upper.data) == len(call.values)
         return bool(same and np.array_equal(upper.indptr, call.indptr) and np.array_equal(upper.indices, call.indices))
 
 
 class _Call:
-    """The arguments that all PARDISO calls on one factorisation share."""
+    """A callable with the arguments that all PARDISO calls for one factorisation share."""
 
     def __init__(self, upper: sparse.csr_matrix, order: NDArray[np.integer] | None) -> None:
         wide = upper.nnz >= 2**31
@@ -129,7 +139,11 @@ class _Call:
         self._threads = _library().MKL_Get_Max_Threads()
 
     def __call__(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
-        """Call PARDISO; after Ctrl-C it runs on alone, and memory that is released meanwhile is released at its end."""
+        """Call PARDISO for one of its phases.
+
+        After Ctrl-C, a call continues on its thread. If its memory is to be released meanwhile, that happens at its
+        end.
+        """
         if phase == _RELEASE:
             self._is_released = True
             self._release()
@@ -139,14 +153,14 @@ class _Call:
             interruptible(self._alone, phase, rhs, solution)
 
     def _alone(self, phase: int, rhs: NDArray[Any] | None, solution: NDArray[Any] | None) -> None:
-        """Call PARDISO while no other call does."""
+        """Call PARDISO while no other call for this factorisation runs."""
         with self._lock:
             self._run(phase, rhs, solution)
         if self._is_released:
             self._release()
 
     def _release(self) -> None:
-        """Release the memory, unless another call is running, which will do so."""
+        """Release the memory, unless a call is running, which will do so at its end."""
         if self._lock.acquire(blocking=False):
             try:
                 self._run(_RELEASE)
@@ -154,13 +168,14 @@ class _Call:
                 self._lock.release()
 
     def _run(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
+        """Call the function of the library, and raise `FactorizationError` if it fails."""
         integer, values = self._integer, self.values  # which are others once nobody waits for this call
         status = integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])
         empty = np.zeros(1, dtype=values.dtype)
         waits = _wait_at_most(LONGEST_WAIT)
         # a two-level factor made on several threads gives wrong solutions on one, without an error, and vice versa
-        others = _library().MKL_Set_Num_Threads_Local(self._threads)
+        threads_before = _library().MKL_Set_Num_Threads_Local(self._threads)
         self._function(
             _address(self._handle),
             ctypes.byref(integer(1)),  # number of factors in memory
@@ -177,7 +192,7 @@ class _Call:
             _address(empty if solution is None else solution),
             ctypes.byref(status),
         )
-        _library().MKL_Set_Num_Threads_Local(others)
+        _library().MKL_Set_Num_Threads_Local(threads_before)
         _wait_at_most(waits)
         if status.value != 0:
             cause = _CAUSES.get(status.value, "see the PARDISO manual")
@@ -187,6 +202,7 @@ class _Call:
 
 
 def _address(array: NDArray[Any]) -> ctypes.c_void_p:
+    """Return the address of an array's data."""
     return ctypes.c_void_p(array.ctypes.data)
 
 
@@ -209,7 +225,7 @@ def _library() -> ctypes.CDLL:
 
 
 def _wait_at_most(milliseconds: int) -> int:
-    """Limit how long the threads that this one starts wait for more work; return how long they did before."""
+    """Set how many milliseconds the threads that this one starts wait for more work; return the number before."""
     openmp = _openmp()
     if openmp is None:
         return 0
@@ -220,16 +236,19 @@ def _wait_at_most(milliseconds: int) -> int:
 
 @cache
 def _openmp() -> ctypes.CDLL | None:
-    """Find the OpenMP library of Intel that MKL has loaded, if its threads are those of this library."""
+    """Return the OpenMP library of Intel that MKL has loaded, or None if its threads are those of another library."""
     paths = [library["filepath"] for library in threadpool_info() if library["prefix"] == "libiomp"]
     return ctypes.CDLL(paths[0]) if paths else None
 
 
 @cache
 def _makes_factors_anew() -> bool:
-    """Return whether MKL can reuse an analysis: before 2026.2 two-level factors silently stay those of the first."""
-    one, two = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
-    half = PardisoFactor(one)._again(two).solve(np.ones(1))[0]
+    """Whether this version of MKL can reuse an analysis for another matrix.
+
+    Before 2026.2, two-level factors silently stay those of the first matrix.
+    """
+    unit, double = (sparse.csr_matrix(np.array([[diagonal]])) for diagonal in (1.0, 2.0))
+    half = PardisoFactor(unit)._again(double).solve(np.ones(1))[0]
     return bool(abs(half - 0.5) < 0.25)  # the result is rounded on some processors
 
 

@@ -1,4 +1,4 @@
-"""Solutions that leave the range of floating-point numbers: restarts that are safe from underflow."""
+"""Solutions of linear systems that decay below the range of floating-point numbers, computed in stages."""
 
 from __future__ import annotations
 
@@ -12,30 +12,34 @@ from scipy import sparse
 from ..arrays import Bools, Floats
 
 Solve = Callable[[NDArray[Any]], NDArray[Any]]
-"""From right-hand sides (n, k) or (n,) to the solutions."""
+"""A function that takes right-hand sides, (n,) or (n, k), and returns the solutions."""
 Forces = Callable[[NDArray[Any], Bools], tuple[Bools, NDArray[Any]]]
-"""From x, zero except on the faint rows (where the stages so far are too small), and the (n,) mask of these rows: to
-the (n,) mask of the rows that couple faint rows to others, and A x on these."""
+"""A function of x and of the (n,) mask of faint rows, on which the stages so far are too small; x is 0 on other rows.
+It returns the (n,) mask of the border, the rows that couple faint rows to others, and A x, which is used there."""
 
 
 class Stage(NamedTuple):
-    """A part of a solution: ``values · exp(logarithm)``."""
+    """Part of a solution on some of the rows, ``values · exp(logarithm)``."""
 
-    values: NDArray[Any]  # (n, k) or (n,), NaN on rows that an earlier stage has
-    logarithm: float  # natural logarithm of the factor
+    values: NDArray[Any]  # (n, k) or (n,), NaN on rows that an earlier stage contains
+    logarithm: float  # natural logarithm of the factor of all values
 
 
 def solve_with_restarts(solve: Solve, border_forces: Forces, loads: NDArray[Any], size: float = 1.0) -> list[Stage]:
-    """Solve ``A x = loads`` for columns that decay exponentially away from the loads; return the stages of x.
+    """Solve ``A x = loads`` for columns x that decay exponentially away from the loads; return the stages of x.
 
-    Loads are scaled to `size`, about that of the diagonal; each stage has the rows on which earlier ones are too small.
+    Each stage contains the rows on which earlier ones are too small. Loads are scaled to `size`, the typical size of
+    entries on the diagonal of A.
     """
     loads, logarithm = scaled(loads, size)
     return restart(solve, border_forces, loads, Stage(solve(loads), logarithm), size)
 
 
 def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Stage, size: float = 1.0) -> list[Stage]:
-    """Return all stages, given the first: where x is too faint, it solves the same equation loaded along the border."""
+    """Return all stages of a solution, given the first one.
+
+    On rows where x is too small, the same equation is solved again, with loads along the border of these rows.
+    """
     stages, unknown = [first], np.ones(len(loads), dtype=bool)
     while True:
         values, logarithm = stages[-1]
@@ -54,7 +58,7 @@ def restart(solve: Solve, border_forces: Forces, loads: NDArray[Any], first: Sta
 
 
 def scaled(loads: NDArray[Any], size: float) -> tuple[NDArray[Any], float]:
-    """Return loads times a power of two that makes the largest about `size`, and the logarithm of its inverse."""
+    """Return loads times a power of two, so that the largest is about `size`, and the logarithm of its inverse."""
     largest = float(largest_components(loads).max(initial=0.0))
     if largest == 0.0:
         return loads, 0.0
@@ -64,7 +68,7 @@ def scaled(loads: NDArray[Any], size: float) -> tuple[NDArray[Any], float]:
 
 
 def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
-    """Return the function that computes forces at the border of faint rows, from the whole matrix A."""
+    """Return the `Forces` of a matrix A, which is given as a whole."""
     pattern = sparse.csr_matrix((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
     def border_forces(values: NDArray[Any], faint: Bools) -> tuple[Bools, NDArray[Any]]:
@@ -75,7 +79,7 @@ def matrix_forces(matrix: sparse.csr_matrix) -> Forces:
 
 
 def largest_components(values: NDArray[Any]) -> Floats:
-    """Return (n,) the largest real or imaginary part in each row: squares would underflow."""
+    """Return (n,) the largest absolute real or imaginary part in each row, without squares, which would underflow."""
     parts = [values.real, values.imag] if np.iscomplexobj(values) else [values]
     sizes = np.zeros(len(values))
     for part in parts:
@@ -85,5 +89,5 @@ def largest_components(values: NDArray[Any]) -> Floats:
 
 
 def _rows(chosen: Bools, values: NDArray[Any]) -> Bools:
-    """Reshape a choice of rows so that it applies to every column."""
+    """Reshape an (n,) mask of rows so that it broadcasts with values of shape (n, …)."""
     return chosen.reshape(-1, *[1] * (values.ndim - 1))

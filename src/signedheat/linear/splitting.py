@@ -12,22 +12,23 @@ Map = Callable[[NDArray[Any]], NDArray[Any]]
 
 
 class Round(NamedTuple):
-    """The state after one round."""
+    """The state of ADMM after a round, for ``min f(z) + g(x)`` with ``z = K x``."""
 
     solution: NDArray[Any]  # x
     image: NDArray[Any]  # K x
     split: NDArray[Any]  # z
-    before: NDArray[Any]  # z in the round before
+    before: NDArray[Any]  # z after the round before
     scaled_dual: NDArray[Any]  # multipliers over the penalty; changes made in place are used by the next round
 
 
 def split_rounds(
     proximal: Map, solve: Map, apply: Map, image: NDArray[Any], split: NDArray[Any], relaxation: float = 1.6
 ) -> Iterator[Round]:
-    """Yield the state after each round, without end; `image` and `split` are the initial K x and z.
+    """Yield the state of ADMM after each round, without end.
 
-    `proximal` minimises f(z) + ρ/2 |z − v|², v = K x + u; `solve` minimises g(x) + ρ/2 |K x − v|², v = z − u.
-    Rounds are fewest with a relaxation of 1.5 to 1.8.
+    ``proximal(v)`` returns the z that minimises f(z) + ρ/2 |z − v|², ``solve(v)`` the x that minimises g(x) + ρ/2
+    |K x − v|², and ``apply(x)`` is K x. `image` and `split` are the initial K x and z. With a relaxation of 1.5 to 1.8
+    the fewest rounds are needed.
     """
     relaxed, dual = image, np.zeros_like(image)
     while True:

@@ -1,7 +1,7 @@
-"""SciPy's SuperLU, available on every platform; systems are then solved with its lower factor alone.
+"""Factorisation by SciPy's SuperLU, which is available on every platform.
 
-The upper factor of a Hermitian matrix is ``D Lᴴ``, so that it need not be kept: a factor takes half the memory and a
-solution half the time, since most of that is spent on reading the factors.
+Systems are solved with its lower factor alone, since the upper factor of a Hermitian matrix is ``D Lᴴ``. So a factor
+takes half the memory and a solution half the time, most of which is spent on reading factors.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ from .threads import one_blas_thread
 class SuperLUFactor:
     """Factor ``L D Lᴴ`` of a Hermitian positive definite matrix.
 
-    Unknowns are eliminated in a given order, or else by nested dissection: SuperLU's own order takes minutes.
+    Unknown ``order[k]`` is eliminated k-th; by default the order is that of nested dissection. SuperLU would take
+    minutes to find an order of its own.
     """
 
     backend = "superlu"
@@ -45,7 +46,7 @@ class SuperLUFactor:
             )
 
     def solve(self, rhs: NDArray[Any]) -> NDArray[Any]:
-        """Solve for one right-hand side (n,) or several (n, k)."""
+        """Return the solutions for one right-hand side, (n,), or several, (n, k)."""
         ordered = np.ascontiguousarray(np.asarray(rhs, dtype=self.dtype)[self._order])
         factor = self._lower.indptr, self._lower.indices, self._lower.data, self._pivots
         if ordered.size == self.n:
@@ -58,14 +59,15 @@ class SuperLUFactor:
 
     @property
     def nonzeros(self) -> int:
-        """Entries stored in the factor."""
+        """Number of entries stored in the factor."""
         return int(self._lower.nnz)
 
 
 def _factored(matrix: sparse.csc_matrix) -> tuple[sparse.csc_matrix, Floats, NDArray[np.integer]]:
-    """Return the lower factor, whose columns begin with their diagonal, which is one; pivots; and the order of rows.
+    """Factorise a matrix by SuperLU, and return its lower factor L, the pivots D, (n,), and the order of rows, (n,).
 
-    SuperLU's own copy of the factor ends here: it can only be freed on the thread that made it.
+    Each column of L begins with its diagonal entry, 1. SuperLU's object of the factor is not returned, since it can
+    only be freed on the thread that made it.
     """
     factor = splu(matrix, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return factor.L, factor.U.diagonal().real, factor.perm_r.copy()  # which would keep it alive
@@ -75,7 +77,7 @@ def _factored(matrix: sparse.csc_matrix) -> tuple[sparse.csc_matrix, Floats, NDA
 def _substitute(
     starts: NDArray[np.int32], rows: NDArray[np.int32], lower: NDArray[Any], pivots: Floats, x: NDArray[Any]
 ) -> None:
-    """Replace the right-hand side x (n,) by the solution y of ``L D Lᴴ y = x``; L is given by columns."""
+    """Replace the right-hand side x, (n,), by the solution y of ``L D Lᴴ y = x``; L is stored by columns."""
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
             x[rows[k]] -= lower[k] * x[j]
@@ -91,7 +93,7 @@ def _substitute(
 def _substitute_columns(
     starts: NDArray[np.int32], rows: NDArray[np.int32], lower: NDArray[Any], pivots: Floats, x: NDArray[Any]
 ) -> None:
-    """Do as `_substitute` for all columns of x (n, k) at once, so that each entry of L is read once for all."""
+    """Do the work of `_substitute` for all columns of x, (n, k), so that each entry of L is read once for all."""
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
             row, entry = rows[k], lower[k]

@@ -1,4 +1,4 @@
-"""One thread of BLAS, where more would only wait for one another."""
+"""Limitation of BLAS to one thread, where more threads would only wait for each other."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from . import pardiso
 
 _lock, _users = Lock(), 0
 _limit: Any = None
-"""The limit that the first thread to enter `one_blas_thread` sets, and that the last one to leave removes."""
+"""The limit that the first thread in `one_blas_thread` sets, and that the last one to leave it removes."""
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Limit BLAS to one thread, that of MKL too, while any thread of this process is within such a ``with`` block."""
+    """Limit BLAS, also that of MKL, to one thread while any thread of this process is in such a ``with`` block."""
     global _users, _limit
     with _lock:
         _users += 1
@@ -36,5 +36,8 @@ def one_blas_thread() -> Iterator[None]:
 
 @cache
 def _libraries(with_mkl: bool) -> ThreadpoolController:
-    """Find the BLAS libraries of this process, which takes 2 ms; SciPy's is there, and MKL's from its first use on."""
+    """Return the controller of the BLAS libraries of this process, which takes 2 ms to find.
+
+    MKL is among these only after its first use, so that there is a controller without and one with it.
+    """
     return ThreadpoolController()

@@ -1,1 +1,1 @@
-"""What is near or around a place: nearest faces, their features, winding numbers."""
+"""Queries at points: nearest faces and winding numbers."""

@@ -1,7 +1,8 @@
-"""Faces with normals at their edges and vertices, and the nearest face of points, through a tree of boxes and discs.
+"""Faces with normals at their edges and vertices, and a tree of boxes and discs to find the nearest face of points.
 
-A disc is flat: its plane is that of the faces below a node, its thickness their deviation from it. Far from a surface
-the boxes of many faces are as near as that of the nearest face, since boxes are askew to the surface; few discs are.
+A node's disc contains all faces below it. Its plane is the mean plane of these faces, and its thickness their deviation
+from it. Far from a surface, boxes of many faces are as near as that of the nearest face, since boxes are not aligned
+with the surface. Of the discs only few are.
 """
 
 from __future__ import annotations
@@ -25,39 +26,40 @@ from ..parallel import in_chunks
 from .nearest_triangles import foot_on_triangle, nearest_faces, triangle_rows
 
 EQUALLY_NEAR = 1e-9
-"""Relative difference of distances, or of sines, below which two faces or segments are equally near."""
+"""Relative difference of distances, or of sines, up to which two faces or segments count as equally near."""
 FOLDED_EDGE = 0.02
-"""Length of the sum of two unit normals below which the edge between them is a fold, and decides no side."""
+"""Length of the sum of the unit normals of two faces up to which their common edge is a fold. Its normal is then too
+inaccurate to tell the side of a point."""
 DISC_THICKNESS = 0.5
-"""Thickness over radius up to which a disc is used besides the box."""
+"""Half thickness of a disc, relative to its radius, below which it is used besides the box."""
 FARTHEST_SEARCH = 1e7
 """Distance, in sizes of a surface, to which farther points are moved before a search, since rounding grows with
-distance. Rounding and the changed angle then move the nearest place by at most 1e-7 of the size."""
+distance. Rounding and the changed angle then move the nearest point by at most 1e-7 of the size."""
 
 
 class FaceFeatures(NamedTuple):
     """Triangles with the normals of their features (Bærentzen & Aanæs 2005).
 
-    An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other;
-    a vertex is regular if all its edges are and its faces make one fan. Faces are regular unless they bound nothing,
-    and then neither are their edges and vertices. At regular features the sign of ``(x − y) · normal`` is the side of a
-    point x whose nearest place is y.
+    An edge is regular if exactly two faces share it, run along it in opposite directions and do not lie on each other.
+    A vertex is regular if all its edges are and its faces form one fan. Faces that bound nothing are not regular, nor
+    are their edges and vertices. If y is the nearest point of the surface to x, and lies on a regular feature, the sign
+    of ``(x − y) · normal`` tells on which side of the surface x is.
     """
 
     corners: Floats  # (m, 9) corners of the faces, each face once, in the order of a space-filling curve
-    rows: Floats  # (m, 16) the same for `foot_on_triangle`: see `triangle_rows`
+    rows: Floats  # (m, 16) the faces in the form of `triangle_rows`, for `foot_on_triangle`
     vertices: Floats  # (n, 3) positions
     faces: NDArray[np.int32]  # (m, 3) vertices; equal positions have equal ids
     edges: NDArray[np.int32]  # (m, 3) edges, from corner k to corner k + 1
     face_normals: Floats  # (m, 3) unit normals
     edge_normals: Floats  # (e, 3) sums of the unit normals of the faces at each edge
     vertex_normals: Floats  # (n, 3) sums of the unit normals of the faces at each vertex, weighted by angles
-    # (m,), (e,) and (n,) whether each face, edge and vertex is regular: the surface is closed and consistent there
+    # (m,), (e,) and (n,) whether each face, edge and vertex is regular
     face_regular: Bools
     edge_regular: Bools
     vertex_regular: Bools
     trusted: NDArray[np.float32]  # (m,) confidence in each face: 1 for given faces, less for completed ones
-    ids: Ints  # (m,) which of the given triangles each is
+    ids: Ints  # (m,) index of each face among the given triangles
 
     @classmethod
     def of(
@@ -67,9 +69,10 @@ class FaceFeatures(NamedTuple):
         trusted: NDArray[np.float32] | None = None,
         bounding: Bools | None = None,
     ) -> FaceFeatures:
-        """Compute the features of (m, 3) faces: merge coincident vertices, drop faces without extent and copies.
+        """Compute the features of (m, 3) faces, after merging coincident vertices.
 
-        Faces have full confidence unless `trusted`, (m,), says otherwise, and bound the inside unless `bounding` does.
+        Copies of faces, and faces with two corners at one position, are dropped. `trusted`, (m,), is the confidence in
+        each face, by default 1. `bounding`, (m,), says whether each face bounds the inside, by default all do.
         """
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
@@ -109,7 +112,10 @@ class FaceFeatures(NamedTuple):
 
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, bound: Bools, n_vertices: int) -> tuple[Bools, Bools]:
-    """Return which edges and vertices are regular, given which faces are."""
+    """Return (e,) whether each edge is regular, and (n,) whether each vertex is.
+
+    `bound`, (m,), says whether each face is. `edge_normals`, (e, 3), are sums of the unit normals of faces.
+    """
     edges = (
         (table.face_counts == 2)
         & (table.balance == 0)
@@ -117,10 +123,10 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, bound: Bools, 
     )
     edges[table.face_edges[~bound]] = False
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
-    mated = np.flatnonzero(mates >= 0)
-    others = mates[mated]
-    following = np.where(others % 3 < 2, others + 1, others - 2)
-    fans = connected_components(len(mates), mated, following)  # both leave the same vertex
+    paired = np.flatnonzero(mates >= 0)
+    opposite = mates[paired]
+    following = np.where(opposite % 3 < 2, opposite + 1, opposite - 2)
+    fans = connected_components(len(mates), paired, following)  # both leave the same vertex
     corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
     fan[corners] = fans
     vertices = np.ones(n_vertices, dtype=bool)
@@ -130,7 +136,7 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, bound: Bools, 
 
 
 def _copies(faces: Ints, table: EdgeTable) -> Bools:
-    """Return which faces repeat earlier ones, with the same corners in the same order of rotation."""
+    """Return (m,) bool, true for faces with the same corners, in the same cyclic order, as an earlier face."""
     copies, ahead = np.zeros(len(faces), dtype=bool), (table.face_counts + table.balance) // 2
     alike = np.where(table.forward, ahead[table.face_edges], (table.face_counts - ahead)[table.face_edges])
     beside_others = np.flatnonzero((alike > 1).all(axis=1))  # other faces run along all edges of these as they do
@@ -142,14 +148,14 @@ def _copies(faces: Ints, table: EdgeTable) -> Bools:
 
 @dataclass(frozen=True, eq=False)
 class FaceTree:
-    """Faces, and a tree of boxes around them."""
+    """Faces in a tree of boxes and discs, for finding the face nearest to a point."""
 
     features: FaceFeatures
     tree: BoxTree  # the tree of their boxes
 
     @classmethod
     def of(cls, features: FaceFeatures) -> FaceTree:
-        """Build the tree of some faces; raise `SourceError` if there is none, since a search reads the first one."""
+        """Build the tree of faces; raise `SourceError` if there is no face."""
         if not len(features.corners):
             raise SourceError("no face of the shape has an extent", element="shape")
         triangles = features.corners.reshape(-1, 3, 3)
@@ -159,13 +165,13 @@ class FaceTree:
     def of_triangles(
         cls, triangles: Floats, trusted: NDArray[np.float32] | None = None, bounding: Bools | None = None
     ) -> FaceTree:
-        """Build the tree of (m, 3, 3) triangles, at least one with area; corners at one position are one vertex."""
+        """Build the tree of (m, 3, 3) triangles; `trusted` and `bounding` are as for `FaceFeatures.of`."""
         faces = np.arange(3 * len(triangles)).reshape(-1, 3)
         return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), faces, trusted, bounding))
 
     @cached_property
     def discs(self) -> Floats:
-        """(2 · leaves, 8) centre, normal, radius and half thickness of each node's disc; < 0 if faces are not flat."""
+        """Centre, normal, radius and half thickness of each node's disc, (2 · leaves, 8) float; −1 for no disc."""
         return _discs(self.features.corners, self.tree)
 
     def distances(self, points: Floats) -> Floats:
@@ -174,20 +180,24 @@ class FaceTree:
         return distances
 
     def search(self, points: Floats) -> NearestFaces:
-        """Find the nearest face of each of (n, 3) points, fastest where consecutive points are near each other."""
+        """Find the nearest face of each of (n, 3) points; it is fastest if successive points are near each other."""
         nearer = self._brought_near(points)
         faces, _ = self.nearest(nearer)
         result = feet_on(self.features, faces, nearer)
         return result if nearer is points else replace(result, distances=np.linalg.norm(points - result.places, axis=1))
 
     def _distances(self, points: Floats) -> Floats:
+        """Do the work of `distances` for a chunk of points."""
         nearer = self._brought_near(points)
         if nearer is not points:
             return self.search(points).distances
         return np.sqrt(self.nearest(points)[1])
 
     def _brought_near(self, points: Floats) -> Floats:
-        """Move points farther than `FARTHEST_SEARCH` sizes of the surface towards its middle, to that distance."""
+        """Return the points, those farther than `FARTHEST_SEARCH` sizes of the surface moved towards its middle.
+
+        If none is that far, the same array is returned.
+        """
         lower, upper = self.tree.bounds[1, :3], self.tree.bounds[1, 3:]
         middle, limit = 0.5 * (lower + upper), FARTHEST_SEARCH * float(np.linalg.norm(upper - lower))
         away = points - middle
@@ -200,16 +210,16 @@ class FaceTree:
         return result
 
     def nearest(self, points: Floats) -> tuple[NDArray[np.int32], Floats]:
-        """Return the nearest faces of points, and the squares of their distances."""
+        """Return (n,) the nearest face of each of (n, 3) points, and (n,) the squares of their distances."""
         # a search starts afresh after 512 points, which divides what a thread takes at a time
         return nearest_faces(self.features.rows, self.tree, self.discs, points, 512)
 
 
 @compiled
 def _discs(corners: Floats, tree: BoxTree) -> Floats:
-    """Compute `FaceTree.discs`: for each node of the tree, a flat disc that contains all of its faces.
+    """Compute `FaceTree.discs`, (2 · leaves, 8): for each node of the tree, a flat disc that contains all its faces.
 
-    Discs are convex, so it is enough that they contain the corners. Returns (2 · leaves, 8) numbers.
+    Discs are convex, so it is enough that they contain the corners, (m, 9).
     """
     bounds, items = tree.bounds, tree.items
     leaves = len(bounds) // 2
@@ -252,19 +262,21 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class NearestFaces:
-    """The nearest face of each of some points."""
+    """The nearest face of each of n points."""
 
-    faces: NDArray[np.int32]  # (n,) its id
-    distances: Floats  # (n,) its distance
-    places: Floats  # (n, 3) the nearest place
-    features: NDArray[np.int8]  # (n,) the feature that this place lies on, in the code of `foot_on_triangle`
-    # (n,) cosine of the angle between the normal and the vector from place to point: positive in front of the face
+    faces: NDArray[np.int32]  # (n,) id of the face
+    distances: Floats  # (n,) unsigned distance
+    places: Floats  # (n, 3) the nearest point of the face
+    # (n,) feature on which the nearest point lies: 0 inside the face, 1 to 3 on its edges, 4 to 6 at its corners
+    features: NDArray[np.int8]
+    # (n,) cosine of the angle between the normal of the feature and the vector from the nearest point to the point,
+    # positive in front of the face
     cosines: NDArray[np.float32]
-    regular: Bools  # (n,) whether its sign decides the side: the place is on a regular feature
+    regular: Bools  # (n,) whether the feature is regular, so that the sign of the cosine tells the side
 
 
 def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) -> NearestFaces:
-    """Find the place on the k-th of (n,) faces that is nearest to the k-th of (n, 3) points, for all k."""
+    """Find the nearest point of face faces[k] to points[k], for n faces and (n, 3) points."""
     return NearestFaces(faces, *_feet(features, faces, read_only(points)))
 
 
@@ -272,7 +284,7 @@ def feet_on(features: FaceFeatures, faces: NDArray[np.int32], points: Floats) ->
 def _feet(
     features: FaceFeatures, faces: NDArray[np.int32], points: Floats
 ) -> tuple[Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
-    """Compute the columns of `NearestFaces`, without the faces."""
+    """Compute the fields of `NearestFaces` from `distances` on, for the nearest face of each of (n, 3) points."""
     n = len(points)
     distances, places, kinds = np.empty(n), np.empty((n, 3)), np.empty(n, dtype=np.int8)
     cosines, regular = np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
@@ -280,13 +292,18 @@ def _feet(
         face, x, y, z = np.int64(faces[p]), points[p, 0], points[p, 1], points[p, 2]
         square, kinds[p], fx, fy, fz = foot_on_triangle(features.rows, face, x, y, z)
         distances[p], places[p, 0], places[p, 1], places[p, 2] = np.sqrt(square), fx, fy, fz
-        cosines[p], regular[p] = _facing(features, face, kinds[p], x - fx, y - fy, z - fz)
+        cosines[p], regular[p] = _cosine_to_normal(features, face, kinds[p], x - fx, y - fy, z - fz)
     return distances, places, kinds, cosines, regular
 
 
 @compiled
-def _facing(features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float) -> tuple[float, bool]:
-    """Return the cosine between a feature's normal and (dx, dy, dz), and whether its sign decides the side."""
+def _cosine_to_normal(
+    features: FaceFeatures, face: int, feature: int, dx: float, dy: float, dz: float
+) -> tuple[float, bool]:
+    """Return the cosine of the angle between a feature's normal and (dx, dy, dz), and whether the feature is regular.
+
+    The feature is that of a face: 0 for the face itself, 1 to 3 for its edges, 4 to 6 for its corners.
+    """
     normals, row = features.face_normals, np.int64(face)
     regular = features.face_regular[row]
     if feature > 3:

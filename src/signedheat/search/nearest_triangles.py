@@ -1,4 +1,4 @@
-"""Nearest places on triangles: on one, or on all, through a tree of boxes."""
+"""Nearest points of a triangle, and the nearest of many triangles by a tree of boxes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from ..compiled import compiled
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..parallel import in_chunks
 
-# Feature codes of a foot: 0 inside the face; 1, 2, 3 on its edges (corner 0–1, 1–2, 2–0); 4, 5, 6 its corners 0, 1, 2.
+# The nearest point of a triangle to a point is called its foot. The feature of a foot is 0 inside the triangle, 1, 2, 3
+# on its edges (corner 0–1, 1–2, 2–0), and 4, 5, 6 at its corners 0, 1, 2.
 
 LEAST_HEIGHT = 1e-14
-"""Height of a triangle, relative to its length, up to which it counts as zero: rounding would decide its direction."""
+"""Height of a triangle, relative to its length, up to which it counts as 0, since rounding would decide its plane."""
 POINTS_TOGETHER = 8
 """Number of points that descend a tree together. With 16 a million points take a tenth less time on 20,000 faces, and a
 tenth more on 1.3 million, whose boxes are smaller than the distances between 16 random points; with 4 it is half as
@@ -24,10 +25,11 @@ much again."""
 
 
 def triangle_rows(corners: Floats) -> Floats:
-    """Return (m, 16) the rows that `foot_on_triangle` needs for triangles of (m, 9) corners, in coordinates of their
-    planes.
+    """Return (m, 16) numbers of triangles, with (m, 9) coordinates of corners, that `foot_on_triangle` needs.
 
-    Columns: first corner; axes along the first side and across; its length; direction and length of sides 0–2 and 1–2.
+    Columns 0–2 are the first corner, 3–5 and 6–8 the unit vectors along the first side and across it in the plane, 9
+    the length of the first side, 10–11 and 12 the direction in these axes and the length of side 0–2, and 13–14 and 15
+    those of side 1–2.
     """
     (rows,) = in_chunks(lambda chunk: (_rows(chunk),), corners)
     return rows
@@ -35,6 +37,7 @@ def triangle_rows(corners: Floats) -> Floats:
 
 @np.errstate(all="ignore")
 def _rows(corners: Floats) -> Floats:
+    """Do the work of `triangle_rows` for a chunk of triangles."""
     rows = np.empty((len(corners), 16))
     rows[:, :3] = corners[:, :3]
     u, v = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))
@@ -60,12 +63,17 @@ def _rows(corners: Floats) -> Floats:
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
+    """Return (n,) scalar products of the columns of two (3, n) arrays."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled
 def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tuple[float, int, float, float, float]:
-    """Return the squared distance to triangle f, and feature code and coordinates of the foot, its nearest point."""
+    """Find the foot of a point (x, y, z) on triangle f, the triangle's nearest point.
+
+    Returns the squared distance, the feature of the foot (0 inside, 1 to 3 on edges, 4 to 6 at corners), and its three
+    coordinates. `rows` are those of `triangle_rows`.
+    """
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
     p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
     q = px * rows[f, 6] + py * rows[f, 7] + pz * rows[f, 8]
@@ -104,9 +112,10 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
 
 @compiled
 def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
-    """Write squared distances of (3, n) places to a triangle, and vectors from their feet, to ``out[at]`` (4, n).
+    """Write squared distances of points to triangle f, and the vectors from their feet, to ``out[at]``, (4, n).
 
-    This is `foot_on_triangle` without branches: many places are done at once if the compiler does not know how many.
+    `places` are the coordinates of the points, (3, n). This is `foot_on_triangle` without branches. The compiler
+    vectorises the loop over points if it does not know their number.
     """
     ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
     ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
@@ -152,7 +161,7 @@ def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Float
 
 @compiled
 def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Floats) -> Floats:
-    """Return (n, 3) barycentric coordinates of the place on the k-th of (n,) faces nearest to the k-th point."""
+    """Return (n, 3) barycentric coordinates of the foot of points[k] on triangle faces[k], for n points."""
     weights = np.zeros((len(points), 3))
     for k in range(len(points)):
         f = np.int64(faces[k])
@@ -179,7 +188,7 @@ def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Flo
 
 
 def weights_in(triangles: Floats, places: Floats) -> Floats:
-    """Return (n, 3) barycentric coordinates of (n, 3) places, each in one of (n, 3, 3) triangles."""
+    """Return (n, 3) barycentric coordinates of (n, 3) points in (n, 3, 3) triangles, point k in triangle k."""
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
     return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), read_only(places))
 
@@ -188,21 +197,22 @@ def weights_in(triangles: Floats, places: Floats) -> Floats:
 class TriangleTree:
     """Triangles in a tree of boxes, for finding the triangle nearest to a point."""
 
-    rows: Floats  # (m, 16) the triangles, as `triangle_rows` gives them
+    rows: Floats  # (m, 16) the triangles in the form of `triangle_rows`
     tree: BoxTree  # the tree of their bounding boxes
 
     @classmethod
     def of(cls, triangles: Floats) -> TriangleTree:
-        """Build the tree of (m, 3, 3) corners."""
+        """Build the tree of (m, 3, 3) triangles."""
         rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
         return cls(rows, BoxTree.around(triangles))
 
     @cached_property
     def _no_discs(self) -> Floats:
+        """Rows that say that no node has a disc, (2 · leaves, 8) float."""
         return np.full((len(self.tree.bounds), 8), -1.0)
 
     def nearest(self, points: Floats) -> tuple[Ints, Floats]:
-        """Return the triangle nearest to each of (k, 3) points, and barycentric coordinates of its nearest place."""
+        """Return (k,) the nearest triangle of each of (k, 3) points, and (k, 3) barycentric coordinates of the foot."""
         points = read_only(np.ascontiguousarray(points))
         faces, _ = nearest_faces(self.rows, self.tree, self._no_discs, points, POINTS_TOGETHER * max(len(points), 1))
         return faces.astype(np.int64), barycentric_on_triangles(self.rows, faces, points)
@@ -211,7 +221,11 @@ class TriangleTree:
 def nearest_faces(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Return (n,) the nearest face of each of (n, 3) points, and the squares of their distances: see `_descend`."""
+    """Return (n,) the nearest triangle of each of (n, 3) points, and (n,) the squares of their distances.
+
+    `rows` are those of `triangle_rows`, and `discs` those of `FaceTree.discs`. The search for a point starts with the
+    triangle of the point before, except after every `run` points.
+    """
     return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), POINTS_TOGETHER)))
 
 
@@ -219,11 +233,10 @@ def nearest_faces(
 def _descend(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int, best: Floats
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Find the nearest face of each point (n, 3), and the square of its distance, by descending a tree of boxes and
-    discs.
+    """Do the work of `nearest_faces` by descending a tree of boxes and discs.
 
-    Consecutive points descend together, as many as `best` is long, a number that the compiler must not know. A search
-    starts from the face found before; every `run` points it starts from none.
+    Successive points descend together, as many as the work array `best` is long. The compiler must not know this
+    number.
     """
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))

@@ -1,9 +1,10 @@
-"""Generalized winding numbers of points, through a tree of boxes (Barill et al. 2018).
+"""Generalized winding numbers of points, by a tree of boxes (Barill et al. 2018).
 
-Faces near a point count by their solid angles, faces far away by the moments of the nodes that contain them. Around a
-centre p, with offsets e and area vectors a, 4π times the winding number at ``p − d`` is, by Taylor's theorem, ``a·d /
-r³ + (tr M − 3 M(d) / r²) / r³ + (15 S(d) / r² − 3 tr S(d)) / 2 r⁵``, where ``M(d) = Σ (a·d) (e·d)`` and ``S(d) = Σ
-(a·d) (e·d)²`` are polynomials, of which only the symmetric parts matter.
+Faces near a point count by their solid angles, and faces far away by the moments of a node that contains them. Let p be
+the centre of a node, e the offsets of its faces from p, and a their area vectors, and let r be the length of d. Then
+4π times the winding number at ``p − d`` is, by Taylor's theorem, ``a·d / r³ + (tr M − 3 M(d) / r²) / r³ + (15 S(d) / r²
+− 3 tr S(d)) / 2 r⁵``. Here ``M(d) = Σ (a·d) (e·d)`` and ``S(d) = Σ (a·d) (e·d)²`` are polynomials, of which only the
+symmetric parts matter.
 """
 
 from __future__ import annotations
@@ -22,21 +23,21 @@ from ..mesh.unit_vectors import unit
 from ..parallel import ROWS_PER_TASK, in_chunks
 
 OFF_FACE = 1e-6
-"""Offset of the points in front of a face and behind it that are tested, relative to its size."""
+"""Distance of test points in front of a face and behind it, relative to the square root of its area."""
 APEX_IN_PLANE = 1e-9
-"""Volume of the cone to a triangle, relative to the product of its edges at the apex, up to which the apex is in its
-plane."""
+"""Volume that a point spans with a triangle, relative to the product of its distances to the corners, up to which the
+point counts as lying in the plane of the triangle."""
 MOMENT_RADII = 1.25
-"""Distance, relative to a node's radius, above which its moments replace its faces."""
+"""Distance of a point from a node's centre, relative to the node's radius, above which moments replace its faces."""
 SUMMED_TRIANGLES = 64
-"""Of this many triangles or fewer all are summed for each point, which takes less time than their moments."""
+"""Number of triangles up to which all are summed for each point, which takes less time than to compute moments."""
 
 
 @dataclass(frozen=True, eq=False)
 class WindingTree:
-    """Triangles in a tree, of which each node can replace its triangles for points far away."""
+    """Triangles in a tree of boxes, for winding numbers around points."""
 
-    triangles: Floats  # (m, 3, 3) their corners, counterclockwise from outside
+    triangles: Floats  # (m, 3, 3) corners, counter-clockwise as seen from outside
     tree: BoxTree  # the tree of their boxes
 
     @classmethod
@@ -45,34 +46,44 @@ class WindingTree:
         return cls(triangles, BoxTree.around(triangles))
 
     def numbers(self, points: Floats) -> Floats:
-        """Return (n,) winding numbers around (n, 3) points, to a few hundredths; on a face, those of one side."""
+        """Return (n,) winding numbers around (n, 3) points, with errors of a few hundredths.
+
+        For a point on a face it is that on one of the sides.
+        """
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
         (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
         return numbers
 
     def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
-        """Return (n,) means of the numbers on both sides of places on faces with these unit normals and areas."""
+        """Return (n,) means of the winding numbers on both sides of points on faces.
+
+        The points and the unit normals of their faces are (n, 3), and the areas of the faces (n,).
+        """
         steps = OFF_FACE * np.sqrt(areas)[:, None] * normals
         return 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
-        """Return (n,) winding numbers just behind places (n, 3) in faces (n,), away from their rims."""
+        """Return (n,) winding numbers just behind (n, 3) points in (n,) faces, which are not near their edges."""
         return self.numbers(places - steps_off(self.triangles[faces], OFF_FACE))
 
     @cached_property
     def _moments(self) -> Floats:
+        """Moments of the nodes of the tree, (2 · leaves, 23) float."""
         return _moments(self.triangles, self.tree)
 
 
 def steps_off(triangles: Floats, depth: float) -> Floats:
-    """Return (m, 3) steps along the normals of triangles, as long as `depth` times the root of twice their areas."""
+    """Return (m, 3) vectors along the normals of (m, 3, 3) triangles, of length `depth` times √(2 · area)."""
     normals = 2.0 * area_vectors(triangles)
     return depth * np.sqrt(np.linalg.norm(normals, axis=1))[:, None] * unit(normals)
 
 
 def winding_sums(triangles: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers around few points, triangle by triangle (van Oosterom & Strackee 1983)."""
+    """Return (n,) winding numbers of (m, 3, 3) triangles around few points, (n, 3), by summing solid angles.
+
+    The solid angle is computed as by van Oosterom & Strackee (1983).
+    """
     numbers = np.zeros(len(points))
     for begin in range(0, len(triangles), ROWS_PER_TASK):
         block = np.ascontiguousarray(
@@ -89,7 +100,10 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
 
 @compiled
 def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
-    """Return (n,) winding numbers, by the solid angles of faces in near leaves and by the `_moments` of far nodes."""
+    """Return (n,) winding numbers, from the solid angles of faces in near leaves and the moments of far nodes.
+
+    `corners` are (m, 9), `items` those of the tree, and `moments` the result of the function `_moments`.
+    """
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
     result = np.zeros(len(points))
@@ -135,7 +149,10 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
 
 @compiled
 def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tuple[float, float]:
-    """Return the parts of a complex number whose argument is half a solid angle (van Oosterom & Strackee 1983)."""
+    """Return real and imaginary part of a complex number whose argument is half the solid angle of a triangle.
+
+    The triangle is a row of (m, 9) corners, seen from (x, y, z) (van Oosterom & Strackee 1983).
+    """
     ax, ay, az = corners[face, 0] - x, corners[face, 1] - y, corners[face, 2] - z
     bx, by, bz = corners[face, 3] - x, corners[face, 4] - y, corners[face, 5] - z
     cx, cy, cz = corners[face, 6] - x, corners[face, 7] - y, corners[face, 8] - z
@@ -150,7 +167,10 @@ def solid_angle(corners: Floats, face: int, x: float, y: float, z: float) -> tup
 
 @compiled
 def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> float:
-    """Return the signed solid angle of a triangle from a point; in its plane 0, the mean of those on both sides."""
+    """Return the signed solid angle of a triangle, a row of (m, 9) corners, seen from (x, y, z).
+
+    For points in its plane it is 0, the mean of the angles on both sides.
+    """
     rest, volume = solid_angle(corners, face, x, y, z)
     scale = 1.0
     for c in range(0, 9, 3):
@@ -160,13 +180,17 @@ def mean_angle(corners: Floats, face: int, x: float, y: float, z: float) -> floa
 
 
 SQUARES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Terms of M: xx, yy, zz, xy, xz, yz."""
+"""Axes of the terms of M, which are xx, yy, zz, xy, xz, yz."""
 CUBES = ((0, 0, 0), (1, 1, 1), (2, 2, 2), (0, 0, 1), (0, 0, 2), (0, 1, 1), (1, 1, 2), (0, 2, 2), (1, 2, 2), (0, 1, 2))
-"""Terms of S: xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
+"""Axes of the terms of S, which are xxx, yyy, zzz, xxy, xxz, xyy, yyz, xzz, yzz, xyz."""
 
 
 def _moments(triangles: Floats, tree: BoxTree) -> Floats:
-    """Return (2 · leaves, 23) area vector, centre, (`MOMENT_RADII` · radius)², and coefficients of M and S."""
+    """Return (2 · leaves, 23) moments of the nodes of a tree.
+
+    The columns are the area vector (3), the centre (3), (`MOMENT_RADII` · radius)², and the coefficients of M (6) and S
+    (10). For few triangles, the radius is infinite, so that moments are not used.
+    """
     leaves = len(tree.bounds) // 2
     if len(triangles) <= SUMMED_TRIANGLES:
         return np.full((2 * leaves, 7 + len(SQUARES) + len(CUBES)), np.inf)  # none is as far away as that
@@ -201,7 +225,11 @@ def _moments(triangles: Floats, tree: BoxTree) -> Floats:
 
 
 def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
-    """Return sums of leaves: area vectors, areas, areas times centres; and their centres, M, S, and radii."""
+    """Return moments of leaves, whose triangles are rows of `grouped`, −1 for none.
+
+    These are the sums of area vectors, of areas, and of areas times centroids, and then centres, M, S, and radii. The
+    last axis of each counts the leaves.
+    """
     filled = grouped >= 0
     corners = np.where(filled[..., None, None], triangles[grouped], 0.0)
     corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
@@ -223,7 +251,7 @@ def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
 
 
 def _product(form: Floats, line: Floats) -> Floats:
-    """Return the coefficients of a linear or quadratic form, (3, …) or (6, …), times a linear one."""
+    """Return the coefficients of the product of a linear or quadratic form, (3, …) or (6, …), and a linear one."""
     given, wanted = (((0,), (1,), (2,)), SQUARES) if len(form) == 3 else (SQUARES, CUBES)
     result = np.zeros((len(wanted), *form.shape[1:]))
     for term, axes in enumerate(given):
@@ -233,6 +261,7 @@ def _product(form: Floats, line: Floats) -> Floats:
 
 
 def _over(firsts: Floats, weights: Floats) -> Floats:
+    """Return quotients, and the numerator where the weight is 0."""
     return firsts / np.where(weights > 0, weights, 1.0)
 
 

@@ -1,1 +1,1 @@
-"""Shapes from anywhere: what is taken for one, conversion, motion, area elements, inspection."""
+"""Shapes of this and of other packages: conversion, affine maps, area elements and inspection."""

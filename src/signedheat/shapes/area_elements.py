@@ -1,8 +1,8 @@
-"""Oriented area elements, the form in which the method takes every shape in space (Eq. 11 in space).
+"""Oriented area elements, the form in which the signed heat method uses every shape on a grid (Eq. 11 in space).
 
-Every shape is split into simplices with a vector, area times normal: triangles (polygons are split), segments of a
-polyline or oriented points. They are bisected until they are no larger than a cell, and merged per cell and connected
-component, so that neither huge faces nor millions of tiny ones cost more than the cells that they pass through.
+A shape is split into simplices with a vector, area times normal. These are triangles (polygons are split), segments of
+a polyline, or oriented points. They are bisected until they are no larger than a cell, and merged per cell and
+connected component. So neither huge faces nor millions of tiny ones cost more than the cells through which they pass.
 """
 
 from __future__ import annotations
@@ -35,40 +35,43 @@ from .foreign import what_to_pass
 
 @dataclass(frozen=True, eq=False)
 class AreaElements:
-    """Simplices with area vectors."""
+    """m simplices in d dimensions, with area vectors; in the plane, areas are lengths."""
 
-    corners: Floats  # (m, c, d) positions of c corners: three for triangles, two for segments, one for points
+    corners: Floats  # (m, c, d) positions of corners; c is 3 for triangles, 2 for segments and 1 for points
     vectors: Floats  # (m, d) area times unit normal
-    weights: Floats  # (m,) area; negative for the parts of a nonconvex polygon's fan that lie outside it
+    weights: Floats  # (m,) area; negative for those parts of a nonconvex polygon's fan that lie outside it
     components: Ints  # (m,) connected component of the shape, from 0
     spacing: float = 0.0  # mean distance between points of a cloud; simplices are sampled as densely as needed
 
 
 @dataclass(frozen=True, eq=False)
 class AreaSamples:
-    """Area elements merged per cell of a grid and per connected component."""
+    """s samples of a source on a grid, area elements that are merged per cell and per connected component."""
 
     positions: Floats  # (s, d) mean position, from the grid's origin in units of its spacing
     vectors: Floats  # (s, d) sum of area times unit normal
     weights: Floats  # (s,) sum of areas
     components: Ints  # (s,) connected component of each sample
     source_ids: Ints  # (s,) source of each sample
-    spacing: float  # h_source: the largest of the sources' mean spacings
+    spacing: float  # the largest of the mean spacings of point clouds among the sources
     outside: float  # fraction of the area that lies outside the grid
     # fraction of the area in the grid whose normals cancel with others of the same cell and component: sheets thinner
     # than a cell, and faces given twice with opposite orientations
     cancelled: float
-    nodes: NodeSources  # X₀: the vectors spread to the nodes by linear interpolation, up to a common factor
+    nodes: NodeSources  # X₀ of Eq. 12, the vectors spread to the nodes by linear interpolation, up to a common factor
 
     def chosen(self, rows: Ints) -> AreaSamples:
-        """Return some of the samples only; the values that describe all of them together stay as they are."""
+        """Return the samples with the given indices; numbers that describe all samples together are not changed."""
         by_sample = ("positions", "vectors", "weights", "components", "source_ids")
         return replace(self, **{name: getattr(self, name)[rows] for name in by_sample})
 
 
 @singledispatch
 def area_elements(shape: Any) -> AreaElements:
-    """Split a shape in space or in the plane into simplices with area vectors; every kind of shape registers here."""
+    """Split a shape in space or in the plane into simplices with area vectors.
+
+    Every type of shape registers a function of its own.
+    """
     raise SourceError(
         f"distance in space is measured to a TriangleMesh, PolygonMesh or PointCloud with normals, in the plane to a "
         f"Polyline, not to a {type(shape).__name__}",
@@ -91,7 +94,7 @@ def _(shape: TetMesh) -> AreaElements:
 
 @area_elements.register
 def _(shape: PolygonMesh) -> AreaElements:
-    """Split polygons into fans around centroids: their area vectors sum to the polygon's, planar and convex or not."""
+    """Split polygons into fans of triangles around their centroids, whose area vectors sum to that of the polygon."""
     polygon = shape.corner_polygons
     fans = np.stack([shape.corners, shape.next_corners], axis=1)
     corners = np.concatenate([shape.polygon_centroids[polygon][:, None], shape.vertices[fans]], axis=1)
@@ -116,7 +119,7 @@ def _(shape: PointCloud) -> AreaElements:
 
 
 def bounds_around(shapes: Sequence[Any]) -> Floats:
-    """Return the (2, d) lower and upper corner of the box around shapes; refuse shapes without area elements."""
+    """Return the (2, d) lower and upper corner of the box around shapes; raise an error for other objects."""
     for shape in shapes:
         if area_elements.dispatch(type(shape)) is area_elements.dispatch(object):
             area_elements(shape)  # which raises
@@ -125,23 +128,30 @@ def bounds_around(shapes: Sequence[Any]) -> Floats:
 
 
 def point_areas(points: Floats) -> Floats:
-    """Estimate (n,) areas of points: that of the disk up to the k-th neighbour, over k; coinciding points share one."""
-    places, which, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
+    """Estimate the (n,) areas of the surface that (n, d) points represent.
+
+    It is the area of the disk up to the k-th neighbour, divided by k. Coinciding points share it equally.
+    """
+    distinct, number, counts = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     dimension = points.shape[1] - 1
-    k = min(POINT_NEIGHBORS, len(places) - 1)
+    k = min(POINT_NEIGHBORS, len(distinct) - 1)
     if dimension == 0 or k == 0:
-        return np.ones(len(points)) / counts[which.ravel()]
-    reach = PointTree(places).query(places, k=[k + 1])[0][:, 0]
-    return (areas_per_point(reach, k, dimension) / counts)[which.ravel()]
+        return np.ones(len(points)) / counts[number.ravel()]
+    reach = PointTree(distinct).query(distinct, k=[k + 1])[0][:, 0]
+    return (areas_per_point(reach, k, dimension) / counts)[number.ravel()]
 
 
 def components_of(vertices: Floats, faces: Ints) -> Ints:
-    """Return the (m,) connected component of each face; vertices at the same position count as one."""
+    """Return (m,) the connected component of each face; vertices at exactly the same position count as one."""
     return element_components(same_positions(vertices)[faces])
 
 
 def sample_on_grid(shapes: Sequence[Any], grid: Grid) -> AreaSamples:
-    """Bisect the elements of shapes until no edge is longer than a cell; merge them per cell and component."""
+    """Return the samples of shapes on a grid.
+
+    Area elements are bisected until no edge is longer than a cell, and merged per cell and connected component. Raises
+    `SourceError` if nothing of the shapes lies in the grid, or all normals cancel.
+    """
     steps = np.zeros(4)
     steps[4 - grid.dimension :] = grid.spacing
     nodes = NodeSources.empty(padded_shape(grid.shape), steps)

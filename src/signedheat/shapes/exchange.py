@@ -1,7 +1,7 @@
-"""Conversion of shapes to objects of trimesh, PyVista, meshio and Open3D, and back; pictures of shapes and fields.
+"""Conversion of shapes to and from objects of trimesh, PyVista, meshio and Open3D, and pictures of shapes and fields.
 
-All conversions pass through `Elements`: positions, faces, normals of points, or tets. Vertices and faces keep their
-number and order in both directions. Each package is imported only where it is used.
+All conversions go through `Elements`, with positions, faces, normals of points, or tets. Vertices and faces keep their
+number and order in both directions. Each package is imported only when it is needed.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..packages import lazy_module
 from ..validation import array_of, coordinates, element_ids
 
 ACCEPTED_SHAPES = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
-"""What functions accept as a shape, in the words of error messages."""
+"""Description, for error messages, of the objects that functions accept as a shape."""
 
 if TYPE_CHECKING:
     import meshio
@@ -52,25 +52,26 @@ FLAT_CELLS = ("vertex", "line", "triangle", "quad", "polygon")
 
 
 def with_values(thing: Any, values: NDArray[np.floating]) -> Any:
-    """Give an object of PyVista the values of a field at its points."""
+    """Set the values of a field at the points of an object of PyVista, as its active scalars, and return the object."""
     thing.point_data[VALUES_NAME] = np.array(values)
     thing.set_active_scalars(VALUES_NAME)
     return thing
 
 
 class Displayed:
-    """A shape or a field that can be looked at."""
+    """Base class of shapes and fields, which can be converted to PyVista and shown."""
 
     def to_pyvista(self) -> pyvista.DataSet:
-        """Convert to PyVista.
+        """Convert this object to a PyVista data set.
 
         Returns
         -------
         pyvista.DataSet
-            `pyvista.PolyData` of triangles, polygons, lines or points, `pyvista.ImageData` of grids, and
-            `pyvista.UnstructuredGrid` of tets. Values of a field are point data ``signed_distance``, normals of points
-            ``Normals``. Lines and grids in the plane have z = 0. A solid gives its boundary, voxels their faces, an
-            intrinsic triangulation its mesh, and a cut surface what `Field.expand` returns, so that the jumps show.
+            `pyvista.PolyData` for triangles, polygons, lines or points, `pyvista.ImageData` for grids, and
+            `pyvista.UnstructuredGrid` for tets. The point data ``signed_distance`` holds values of a field, and
+            ``Normals`` the normals of points. Lines and grids in the plane have z = 0. A solid is converted by its
+            boundary, voxels by their faces, an intrinsic triangulation by its mesh, and a cut surface by the mesh of
+            `Field.expand`, on which jumps are visible.
 
         Raises
         ------
@@ -93,15 +94,15 @@ class Displayed:
         raise NotImplementedError
 
     def plotter(self) -> pyvista.Plotter:
-        """Draw this into a `pyvista.Plotter`, to which more can be added, and which can be saved to a file.
+        """Draw this object into a new `pyvista.Plotter`, which can be shown, extended, or saved as a picture.
 
-        Fields have the colours of all pictures here: blue for negative distance, orange for positive, light at zero.
-        The surface or line of distance zero is drawn too. Of shapes, outer sides are light and inner sides red.
+        Fields are blue where distance is negative, orange where it is positive, and light at zero. The surface or line
+        of distance zero is drawn, too. Outer sides of shapes are light, and inner sides are red.
 
         Returns
         -------
         pyvista.Plotter
-            Not shown yet.
+            The plotter, which has not been shown yet.
 
         Raises
         ------
@@ -120,12 +121,14 @@ class Displayed:
         return windows.plotter_of(self)
 
     def plot(self) -> object:
-        """Show this in a window or a notebook, by PyVista; in notebooks you can rotate it if trame is installed.
+        """Show this object in a window or a notebook, with PyVista.
+
+        In a notebook, the view can be rotated if trame is installed.
 
         Returns
         -------
         object
-            What `pyvista.Plotter.show` returns: None after a window, and in a notebook what is displayed.
+            The result of `pyvista.Plotter.show`, which is None for a window, and the displayed object in a notebook.
 
         Raises
         ------
@@ -144,34 +147,36 @@ class Displayed:
         return self.plotter().show()
 
     def _repr_html_(self) -> str:
+        """Return the HTML that notebooks show for this object."""
         return drawing.html_of(self)
 
 
 def _no_ids() -> Ints:
+    """Return an empty array of ids."""
     return np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class Elements:
-    """The elements of a shape, the form in which it passes from one package to another."""
+    """A shape as plain arrays, the form in which it is passed from one package to another."""
 
     points: NDArray[Any]  # (n, 3) vertices, or the points of a cloud
     corners: Ints = field(default_factory=_no_ids)  # vertex ids of all faces, one face after another
     counts: Ints = field(default_factory=_no_ids)  # (m,) number of corners of each face; a cloud and tets have no faces
-    normals: NDArray[Any] | None = None  # (n, 3) of points
+    normals: NDArray[Any] | None = None  # (n, 3) normals of points
     tets: Ints | None = None  # (t, 4) vertex ids
-    areas: NDArray[Any] | None = None  # (n,) of points
+    areas: NDArray[Any] | None = None  # (n,) areas of points
     values: Mapping[str, NDArray[Any]] = field(default_factory=dict)  # further numbers at the points, by name
 
     @classmethod
     def of_triangles(cls, points: NDArray[Any], faces: Any, normals: NDArray[Any] | None = None) -> Elements:
-        """Make the elements of a cloud, or of a mesh whose faces are rows of three vertex ids."""
+        """Make the elements of a mesh with faces of three vertex ids, or of a cloud if there are no faces."""
         rows = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
         return cls(points, rows.ravel(), np.full(len(rows), 3), normals)
 
     @property
     def kind(self) -> str:
-        """The name of the kind of shape that has these elements."""
+        """Name of the class of shapes that fits these elements, such as "TriangleMesh"."""
         if self.tets is not None:
             return "TetMesh"
         if not len(self.counts):
@@ -180,14 +185,14 @@ class Elements:
 
     @property
     def faces(self) -> list[Ints]:
-        """Vertex ids of each face; for tets, of their outer faces."""
+        """Vertex ids of each face; for tets, of each outer face."""
         if self.tets is not None:
             return list(outer_faces(self.points, self.tets))
         return np.split(self.corners, np.cumsum(self.counts)[:-1]) if len(self.counts) else []
 
     @property
     def triangles(self) -> Ints:
-        """(m, 3) vertex ids of the faces, which must be triangles; for tets, of their outer faces."""
+        """Vertex ids of the faces, which must be triangles, or of the outer faces of tets, (m, 3) int."""
         if self.tets is not None:
             return outer_faces(self.points, self.tets)
         wrong = np.flatnonzero(self.counts != 3)
@@ -203,13 +208,13 @@ class Elements:
 def outer_faces(points: NDArray[Any], tets: Ints) -> Ints:
     """Return the (m, 3) vertex ids of the faces that belong to one tet only, oriented outward."""
     ids = element_ids(tets, "tets", 4, len(points))
-    turned = np.where(signed_volumes(coordinates(points, "vertices", 3), ids)[:, None] < 0, ids[:, [0, 1, 3, 2]], ids)
-    table = face_table(turned)
+    oriented = np.where(signed_volumes(coordinates(points, "vertices", 3), ids)[:, None] < 0, ids[:, [0, 1, 3, 2]], ids)
+    table = face_table(oriented)
     return table.vertices[table.tet_counts == 1]
 
 
 class Exchangeable(Displayed, Generic[Trimesh]):
-    """A shape that can be saved, and converted from and to objects of trimesh, PyVista, meshio and Open3D.
+    """Base class of shapes that can be saved, and converted from and to objects of trimesh, PyVista, meshio and Open3D.
 
     Vertices and faces keep their number and order. Each package is optional, and imported when it is needed.
 
@@ -231,15 +236,17 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     @property
     def _elements(self) -> Elements:
+        """The arrays of this shape."""
         raise NotImplementedError
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write to a file, in the format given by its extension: see `signedheat.save`.
+        """Write this shape to a file, in the format given by its extension, as `signedheat.save` does.
 
         Parameters
         ----------
         path : str or path
-            ``.stl``, ``.obj``, ``.ply``, ``.off`` or ``.vtp``; points also ``.xyz`` and ``.pc``.
+            A file with the extension ``.stl``, ``.obj``, ``.ply``, ``.off`` or ``.vtp``, or for points also ``.xyz`` or
+            ``.pc``.
 
         Raises
         ------
@@ -264,12 +271,13 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     @classmethod
     def from_trimesh(cls: type[Kind], thing: object) -> Kind:
-        """Convert a mesh, a cloud or a scene of trimesh.
+        """Convert a mesh, a cloud or a scene of trimesh to a shape.
 
         Parameters
         ----------
         thing : object
-            `trimesh.Trimesh`, `trimesh.PointCloud`, or a `trimesh.Scene`, whose meshes are placed as in the scene.
+            A `trimesh.Trimesh`, a `trimesh.PointCloud`, or a `trimesh.Scene`, all meshes of which are joined at their
+            positions in the scene.
 
         Returns
         -------
@@ -279,7 +287,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Raises
         ------
         UnsupportedTypeError
-            If it is no such object of trimesh.
+            If `thing` is no such object of trimesh.
         GeometryError
             If it has no faces and the class needs them, or a coordinate is not finite.
 
@@ -297,12 +305,12 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_trimesh(thing))
 
     def to_trimesh(self) -> Trimesh:
-        """Convert to an object of trimesh.
+        """Convert this shape to an object of trimesh.
 
         Returns
         -------
         trimesh.Trimesh or trimesh.PointCloud
-            With the same coordinates, vertices and faces in the same order: trimesh merges nothing.
+            A mesh, or a cloud if there are no faces, with the same vertices and faces in the same order.
 
         Raises
         ------
@@ -328,14 +336,14 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     @classmethod
     def from_pyvista(cls: type[Kind], thing: object) -> Kind:
-        """Convert a surface of PyVista, or the boundary of tets.
+        """Convert a surface, points, or the boundary of tets of PyVista to a shape.
 
-        Point data ``Normals`` are the normals of points; the parts of a `pyvista.MultiBlock` become one shape.
+        The point data ``Normals`` become normals of points.
 
         Parameters
         ----------
         thing : object
-            `pyvista.PolyData`, `pyvista.UnstructuredGrid`, or a `pyvista.MultiBlock` of them.
+            A `pyvista.PolyData`, a `pyvista.UnstructuredGrid`, or a `pyvista.MultiBlock`, whose parts become one shape.
 
         Returns
         -------
@@ -345,7 +353,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Raises
         ------
         UnsupportedTypeError
-            If it is no such object of PyVista.
+            If `thing` is no such object of PyVista.
         GeometryError
             If it has no faces and the class needs them, or a coordinate is not finite.
 
@@ -374,7 +382,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     @classmethod
     def from_meshio(cls: type[Kind], thing: object) -> Kind:
-        """Convert the triangles, quadrilaterals and polygons, or the points, of a mesh of meshio.
+        """Convert the triangles, quadrilaterals and polygons, or the points, of a mesh of meshio to a shape.
 
         Parameters
         ----------
@@ -389,7 +397,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Raises
         ------
         UnsupportedTypeError
-            If it is no such object of meshio.
+            If `thing` is no `meshio.Mesh`.
         GeometryError
             If it has no faces and the class needs them, or a coordinate is not finite.
 
@@ -408,12 +416,13 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_meshio(thing, as_points=not cls._has_faces))
 
     def to_meshio(self) -> meshio.Mesh:
-        """Convert to a mesh of meshio.
+        """Convert this shape to a mesh of meshio.
 
         Returns
         -------
         meshio.Mesh
-            With the same coordinates; the normals of points are point data ``nx``, ``ny``, ``nz``.
+            A mesh with the same vertices and faces in the same order. The point data ``nx``, ``ny`` and ``nz`` hold
+            normals of points.
 
         Raises
         ------
@@ -448,12 +457,12 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
     @classmethod
     def from_open3d(cls: type[Kind], thing: object) -> Kind:
-        """Convert a mesh or a cloud of Open3D.
+        """Convert a mesh or a cloud of Open3D to a shape.
 
         Parameters
         ----------
         thing : object
-            `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``.
+            A `TriangleMesh` or `PointCloud` of ``open3d.geometry`` or ``open3d.t.geometry``.
 
         Returns
         -------
@@ -463,7 +472,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         Raises
         ------
         UnsupportedTypeError
-            If it is no such object of Open3D.
+            If `thing` is no such object of Open3D.
         GeometryError
             If it has no faces and the class needs them, or a coordinate is not finite.
 
@@ -479,12 +488,13 @@ class Exchangeable(Displayed, Generic[Trimesh]):
         return cls._of(from_open3d(thing))
 
     def to_open3d(self) -> open3d.geometry.Geometry:
-        """Convert to an object of Open3D.
+        """Convert this shape to an object of Open3D.
 
         Returns
         -------
         open3d.geometry.TriangleMesh or open3d.geometry.PointCloud
-            With the same coordinates, in double precision, and normals of points.
+            A mesh, or a cloud if there are no faces, with the same coordinates in double precision, and with normals of
+            points.
 
         Raises
         ------
@@ -514,7 +524,7 @@ class Exchangeable(Displayed, Generic[Trimesh]):
 
 
 def from_trimesh(thing: Any) -> Elements:
-    """Convert a `trimesh.Trimesh`, a `trimesh.PointCloud`, or all meshes of a `trimesh.Scene`, each in its place."""
+    """Convert a `trimesh.Trimesh`, a `trimesh.PointCloud`, or all meshes of a `trimesh.Scene` at their positions."""
     if hasattr(thing, "geometry") and hasattr(thing, "graph"):
         thing = thing.to_mesh()
         if not len(thing.faces):
@@ -537,16 +547,16 @@ def from_pyvista(thing: Any) -> Elements:
     if getattr(thing, "n_strips", 0):
         raise GeometryError("the mesh holds triangle strips", remedy="call its triangulate() first")
     faces = np.asarray(thing.faces, dtype=np.int64)
-    starts, at = [], 0
-    while at < len(faces):
-        starts.append(at)
-        at += 1 + int(faces[at])
+    starts, start = [], 0
+    while start < len(faces):
+        starts.append(start)
+        start += 1 + int(faces[start])
     counts = faces[np.array(starts, dtype=np.int64)]
     return Elements(np.asarray(thing.points), np.delete(faces, starts), counts, thing.point_data.get("Normals"))
 
 
 def _from_cells(thing: Any) -> Elements:
-    """Convert the faces of an unstructured grid; without faces, its tets; without either, its points."""
+    """Convert the faces of a `pyvista.UnstructuredGrid`, or its tets if it has no faces, or else its points."""
     types = np.asarray(thing.celltypes)
     offsets = np.asarray(thing.cell_offsets if hasattr(thing, "cell_offsets") else thing.offset, dtype=np.int64)
     corners = np.asarray(thing.cell_connectivity, dtype=np.int64)
@@ -558,22 +568,25 @@ def _from_cells(thing: Any) -> Elements:
             f"the grid holds neither faces nor tets among its {len(types)} cells",
             remedy="call its extract_surface() or triangulate() first",
         )
-    _, taken = members_of(offsets, np.arange(len(corners)), faces)
+    _, of_faces = members_of(offsets, np.arange(len(corners)), faces)
     normals = thing.point_data.get("Normals")
-    return Elements(np.asarray(thing.points), corners[taken], np.diff(offsets)[faces], normals)
+    return Elements(np.asarray(thing.points), corners[of_faces], np.diff(offsets)[faces], normals)
 
 
 def tets_of_pyvista(grid: Any) -> Ints:
-    """Return the (t, 4) tets of a `pyvista.UnstructuredGrid`; refuse a grid that has other cells with volume."""
+    """Return the (t, 4) tets of a `pyvista.UnstructuredGrid`; raise an error if it has other cells with volume."""
     cells = {int(kind): ids for kind, ids in grid.cells_dict.items()}
     if _VTK_TETRA not in cells or max(cells) > _VTK_TETRA:
-        held = ", ".join(map(str, sorted(cells))) or "none"
-        raise GeometryError(f"its types of cells are {held}, not tets alone (10)", remedy="triangulate it first")
+        kinds = ", ".join(map(str, sorted(cells))) or "none"
+        raise GeometryError(f"its types of cells are {kinds}, not tets alone (10)", remedy="triangulate it first")
     return np.asarray(cells[_VTK_TETRA], dtype=np.int64)
 
 
 def from_meshio(thing: Any, as_points: bool = False) -> Elements:
-    """Convert the polygons of a `meshio.Mesh`, or else its tets or points; `as_points` ignores cells of other types."""
+    """Convert the polygons of a `meshio.Mesh`, or its tets if it has no polygons, or else its points.
+
+    Without polygons and tets, cells of other types than points raise an error, unless `as_points`.
+    """
     if not hasattr(thing, "cells") or not hasattr(thing, "points"):
         raise _no_shape(thing, "a Mesh", "read it with meshio.read")
     blocks = [block.data for block in thing.cells if block.type in CELL_SIDES or block.type.startswith("polygon")]
@@ -590,11 +603,11 @@ def from_meshio(thing: Any, as_points: bool = False) -> Elements:
 
 
 def tets_of_meshio(mesh: Any) -> Ints:
-    """Return the (t, 4) tets of a `meshio.Mesh`; refuse a mesh that has other cells with volume."""
+    """Return the (t, 4) tets of a `meshio.Mesh`; raise an error if it has other cells with volume."""
     kinds = sorted({block.type for block in mesh.cells})
     if "tetra" not in kinds or not all(kind == "tetra" or kind.startswith(FLAT_CELLS) for kind in kinds):
-        held = ", ".join(kinds) or "no cells"
-        raise GeometryError(f"it holds {held}, not tets alone", remedy="convert it to linear tetrahedra first")
+        listed = ", ".join(kinds) or "no cells"
+        raise GeometryError(f"it holds {listed}, not tets alone", remedy="convert it to linear tetrahedra first")
     blocks = [block.data for block in mesh.cells if block.type == "tetra"]
     for block in blocks:
         if block.ndim != 2 or block.shape[1] != 4:
@@ -617,7 +630,7 @@ def from_open3d(thing: Any) -> Elements:
 
 
 def from_arrays(pair: Any) -> Elements:
-    """Convert a pair (vertices, faces): rows of positions, and rows of vertex ids, which may differ in length."""
+    """Convert a pair (vertices, faces) of rows of positions and rows of vertex ids, which may differ in length."""
     points, faces = (array_of(part, "vertices and faces") if np.ma.isMaskedArray(part) else part for part in pair)
     if getattr(faces, "ndim", 0) == 2 and faces.dtype != object:
         flat = np.asarray(faces).astype(np.int64).ravel()
@@ -629,6 +642,7 @@ def from_arrays(pair: Any) -> Elements:
 
 
 def _triangles_only(shape: Elements, package: str) -> Ints:
+    """Return (m, 3) faces; raise an error that names the package if some are no triangles."""
     if (shape.counts != 3).any():
         raise GeometryError(
             f"{package} holds triangles only, and this has polygons", remedy="use to_pyvista or to_meshio"
@@ -636,10 +650,11 @@ def _triangles_only(shape: Elements, package: str) -> Ints:
     return np.array(shape.corners.reshape(-1, 3))
 
 
-def _no_shape(thing: object, taken: str, remedy: str) -> UnsupportedTypeError:
+def _no_shape(thing: object, accepted: str, remedy: str) -> UnsupportedTypeError:
+    """Return the error for an object of another package that is no shape; `accepted` says which objects are."""
     kind = type(thing)
     return UnsupportedTypeError(
-        f"{kind.__module__}.{kind.__name__} is not a shape: {taken} is", remedy=remedy, element=kind.__name__
+        f"{kind.__module__}.{kind.__name__} is not a shape: {accepted} is", remedy=remedy, element=kind.__name__
     )
 
 
@@ -650,4 +665,5 @@ ELEMENTS_OF: dict[str, Callable[[Any], Elements]] = {
     "pyvista": from_pyvista,
     "trimesh": from_trimesh,
 }
-"""Function that converts an object to `Elements`, by the package of the object; for NumPy, a pair (vertices, faces)."""
+"""Functions that convert objects to `Elements`, by the package of the object. That of NumPy converts pairs (vertices,
+faces)."""

@@ -1,4 +1,4 @@
-"""Conversion of arguments to shapes: objects of other packages (`signedheat.exchange`), solids, pairs of arrays."""
+"""Conversion of arguments to shapes, from objects of other packages (`exchange`), solids, and pairs of arrays."""
 
 from __future__ import annotations
 
@@ -31,16 +31,16 @@ PACKAGES = frozenset({"meshio", "open3d", "pyvista", "trimesh"})
 
 
 class Represented(ABC):
-    """Something with a surface that is accepted wherever a shape is: solids, images of labels."""
+    """Base class of objects that are accepted as a shape because of their surface, such as solids and label images."""
 
     @property
     @abstractmethod
     def boundary(self) -> TriangleMesh:
-        """The surface of this."""
+        """The surface by which this object is represented."""
 
 
 class HasVertices(Protocol):
-    """A `trimesh.Trimesh` or `trimesh.PointCloud`, seen by a type checker."""
+    """Protocol for type checkers that `trimesh.Trimesh` and `trimesh.PointCloud` satisfy."""
 
     @property
     def vertices(self) -> object: ...
@@ -49,7 +49,7 @@ class HasVertices(Protocol):
 
 
 class HasGeometry(Protocol):
-    """A `trimesh.Scene`, seen by a type checker."""
+    """Protocol for type checkers that `trimesh.Scene` satisfies."""
 
     @property
     def geometry(self) -> object: ...
@@ -58,7 +58,7 @@ class HasGeometry(Protocol):
 
 
 class HasPointData(Protocol):
-    """A `meshio.Mesh` or an object of PyVista, seen by a type checker."""
+    """Protocol for type checkers that `meshio.Mesh` and the data sets of PyVista satisfy."""
 
     @property
     def points(self) -> object: ...
@@ -67,7 +67,7 @@ class HasPointData(Protocol):
 
 
 class HasTriangles(Protocol):
-    """An `open3d.geometry.TriangleMesh`, seen by a type checker."""
+    """Protocol for type checkers that `open3d.geometry.TriangleMesh` satisfies."""
 
     @property
     def vertices(self) -> object: ...
@@ -86,7 +86,7 @@ ForeignShape: TypeAlias = (
 
 
 def what_to_pass(thing: object) -> str:
-    """Suggest what to pass in place of something that is no shape."""
+    """Return the remedy of an error for an object that is no shape, which says what to pass instead."""
     if isinstance(thing, str | PathLike):
         return f'pass sh.read("{fspath(thing)!s}")'
     if isinstance(thing, DigitalSurface):
@@ -97,7 +97,7 @@ def what_to_pass(thing: object) -> str:
 
 
 def package_of(thing: object) -> str | None:
-    """Return the one of `PACKAGES` that defines an object's class or a base class of it; None for other objects."""
+    """Return the package among `PACKAGES` that defines the class of an object or one of its base classes, or None."""
     roots = (kind.__module__.partition(".")[0] for kind in type(thing).__mro__)
     return next((root for root in roots if root in PACKAGES), None)
 
@@ -106,19 +106,19 @@ def package_of(thing: object) -> str | None:
 def as_shape(thing: Shape | ForeignShape) -> Shape:
     """Convert an object of another package, a pair of arrays, a solid or an image to a shape.
 
-    Every function that takes a shape does this by itself. A shape is returned as it is, and a `Solid` gives its
-    ``boundary``. Faces keep their number, order and defects. An object without faces becomes a `PointCloud`, one with
-    triangles only a `TriangleMesh`, and any other a `PolygonMesh`; tets become a `TetMesh`.
+    Functions that take a shape call this themselves. An object with triangles only becomes a `TriangleMesh`, one with
+    other faces a `PolygonMesh`, one with tets a `TetMesh`, and one without any of these a `PointCloud`. Faces keep
+    their number, order and defects. A `Solid` becomes its ``boundary``. A shape is returned as it is.
 
     Parameters
     ----------
     thing : shape, Solid, LabelImage, object of trimesh, PyVista, meshio or Open3D, or (vertices, faces)
-        Vertices are (n, 3) float, faces (m, 3) int or rows of ids of any length.
+        The object. In a pair, vertices are (n, 3) float, and faces (m, 3) int or rows of ids of any length.
 
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or TetMesh
-        The shape.
+        The shape, with the same coordinates.
 
     Raises
     ------
@@ -148,7 +148,7 @@ def as_shape(thing: Shape | ForeignShape) -> Shape:
 
 
 def converted(thing: Thing) -> Thing:
-    """Convert a shape of another package, a solid or an image; return everything else, such as curves, as it is."""
+    """Convert a shape of another package, a solid, an image or a pair of arrays; return other objects as they are."""
     if isinstance(thing, Represented):
         return cast("Thing", thing.boundary)
     package = "numpy" if is_pair(thing) else package_of(thing)
@@ -156,7 +156,7 @@ def converted(thing: Thing) -> Thing:
 
 
 def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh:
-    """Make a shape of these elements, of the kind that fits them."""
+    """Make a shape from elements, of the class that fits them."""
     if elements.tets is not None:
         return TetMesh(elements.points, elements.tets)
     kinds = {kind.__name__: kind for kind in (TriangleMesh, PolygonMesh, PointCloud)}
@@ -164,7 +164,7 @@ def shape_of(elements: Elements) -> TriangleMesh | PolygonMesh | PointCloud | Te
 
 
 def refuse_arrays(things: Sequence[object]) -> None:
-    """Raise if arguments are arrays that were meant as a shape, and say what is wrong with them."""
+    """Raise an error if arguments are numeric arrays that were meant as a shape, and say what is wrong with them."""
     arrays = [np.asarray(thing) for thing in things if like_array(thing)]
     if not arrays or len(arrays) < len(things) or any(array.dtype.kind not in "biuf" for array in arrays):
         return
@@ -186,7 +186,7 @@ def refuse_arrays(things: Sequence[object]) -> None:
 
 
 def as_shapes(things: Thing | Sequence[Thing]) -> list[Thing]:
-    """Return one argument or several as a list, with every shape of another package converted (see `as_shape`).
+    """Return an argument, or a sequence of several, as a list in which shapes of other packages are converted.
 
     Geometries of shapely, GeoPandas and GeoJSON become polylines.
     """
@@ -209,7 +209,7 @@ def elements(shape: SurfaceShape, values: Mapping[str, NDArray[np.floating]] = M
 
 
 def as_list(sources: One | Sequence[One]) -> list[One]:
-    """Return one source or several as a list, with every shape of another package converted; refuse an empty list."""
+    """Return the list of `as_shapes` for a source or a sequence of sources; raise an error if it is empty."""
     listed: list[One] = as_shapes(sources)
     if not listed:
         raise SourceError("no source was given", remedy="pass at least one curve, point or shape")

@@ -16,29 +16,32 @@ shapely: Any = lazy_module("shapely", "geometries of shapely")
 
 
 class HasGeoInterface(Protocol):
-    """A geometry of shapely or GeoPandas, seen by a type checker."""
+    """Protocol for type checkers that geometries of shapely and GeoPandas satisfy."""
 
     @property
     def __geo_interface__(self) -> object: ...
 
 
 def geometry_of(thing: object) -> Mapping[str, Any] | None:
-    """Return GeoJSON for what is a geometry: a mapping of that kind, or an object with ``__geo_interface__``."""
-    found = getattr(thing, "__geo_interface__", thing)
-    return found if isinstance(found, Mapping) and isinstance(found.get("type"), str) else None
+    """Return the GeoJSON mapping of a geometry, or None for other objects.
+
+    A geometry is such a mapping itself, or an object with ``__geo_interface__``.
+    """
+    geometry = getattr(thing, "__geo_interface__", thing)
+    return geometry if isinstance(geometry, Mapping) and isinstance(geometry.get("type"), str) else None
 
 
 def polylines_of(geometry: Mapping[str, Any]) -> list[Polyline]:
-    """Return the lines of a geometry of GeoJSON, and the rings of its polygons, holes opposite to their outlines.
+    """Return the lines and the rings of polygons of a GeoJSON geometry.
 
-    Coordinates beyond the second are left out.
+    Outlines run clockwise and holes counter-clockwise. Only the first two coordinates are used.
 
     Raises
     ------
     UnsupportedTypeError
-        If it holds points, or a type that GeoJSON does not know.
+        If it contains points, or a type that GeoJSON does not define.
     GeometryError
-        If it holds no line, or coordinates are none.
+        If it contains no line, or coordinates are not pairs of numbers.
     """
     lines = list(_lines(geometry))
     if not lines:
@@ -47,6 +50,7 @@ def polylines_of(geometry: Mapping[str, Any]) -> list[Polyline]:
 
 
 def _lines(geometry: Mapping[str, Any]) -> Iterator[Polyline]:
+    """Yield the lines of `polylines_of`, also of nested collections."""
     kind, coordinates = str(geometry.get("type")), geometry.get("coordinates") or ()
     if kind == "Feature":
         if geometry.get("geometry"):
@@ -69,13 +73,14 @@ def _lines(geometry: Mapping[str, Any]) -> Iterator[Polyline]:
 
 
 def _polyline(points: Any, closed: bool) -> Polyline:
+    """Return the polyline through points of GeoJSON; it is closed if `closed`, or if it ends at its first point."""
     try:
-        places = np.array([[float(x) for x in point[:2]] for point in points], dtype=np.float64)
+        positions = np.array([[float(x) for x in point[:2]] for point in points], dtype=np.float64)
     except (TypeError, ValueError, LookupError) as error:
         raise GeometryError(
             f"coordinates of a geometry must be pairs of numbers ({error})", element="coordinates"
         ) from error
-    return Polyline(places, closed or (len(places) > 2 and bool((places[0] == places[-1]).all())))
+    return Polyline(positions, closed or (len(positions) > 2 and bool((positions[0] == positions[-1]).all())))
 
 
 def to_shapely(lines: Polyline | Sequence[Polyline]) -> HasGeoInterface:
@@ -84,13 +89,13 @@ def to_shapely(lines: Polyline | Sequence[Polyline]) -> HasGeoInterface:
     Parameters
     ----------
     lines : Polyline or sequence of Polyline
-        Closed ones become polygons: what lies within an odd number of them is inside, so that outlines in others are
-        their holes. Open ones become lines.
+        Closed polylines bound polygons, with the points inside that an odd number of them enclose, so that outlines
+        within others are holes. Open polylines become lines.
 
     Returns
     -------
     shapely.Polygon, MultiPolygon, LineString, MultiLineString or GeometryCollection
-        What fits.
+        The geometry, of the simplest of these types that can hold it, with the same coordinates.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Count the defects of a shape: open, nonmanifold and inconsistent edges, degenerate and duplicate elements."""
+"""Counts of a shape's elements and defects, such as open, nonmanifold and inconsistent edges or duplicate faces."""
 
 from __future__ import annotations
 
@@ -22,29 +22,29 @@ from ..validation import used_bounds
 from .foreign import Shape
 
 SMALL_PART = 0.01
-"""Parts are small if the diagonal of the box around them is less than this share of that of the largest part."""
+"""Diagonal of the box around a part, relative to that of the largest part, below which the part counts as small."""
 
 
 @dataclass(frozen=True)
 class SurfaceReport:
-    """Elements and defects of a surface. No defect is an error: every such surface has a signed distance."""
+    """Numbers of elements and defects of a surface. None of the defects is an error for signed distance."""
 
     n_vertices: int
     n_faces: int
-    n_edges: int  # between two different vertices
-    corners_per_face: tuple[int, int]  # the least and greatest number
-    components: int  # sets of faces connected through shared vertices
-    small_parts: int  # those whose box has a diagonal below `SMALL_PART` of that of the largest
-    largest_part: float  # the diagonal of the box around the largest
-    open_edges: int  # with a single face
+    n_edges: int  # edges between two different vertices
+    corners_per_face: tuple[int, int]  # the least and the greatest number of corners of a face
+    components: int  # sets of faces that are connected through shared vertices
+    small_parts: int  # components whose box has a diagonal below `SMALL_PART` of that of the largest
+    largest_part: float  # diagonal of the box around the largest component
+    open_edges: int  # edges with a single face
     borders: int  # connected sets of open edges
-    nonmanifold_edges: int  # with more than two faces
-    nonmanifold_vertices: int  # at which the faces do not form a single fan or disk
-    inconsistent_edges: int  # along which two faces run in the same direction, so that one of them is flipped
-    degenerate_faces: int  # without area, or with a repeated vertex
-    duplicate_faces: int  # with the same vertices as an earlier one, in the same or in the opposite order
-    duplicate_vertices: int  # at exactly the position of an earlier one
-    unreferenced_vertices: int  # without a face
+    nonmanifold_edges: int  # edges with more than two faces
+    nonmanifold_vertices: int  # vertices at which the faces do not form a single fan or disk
+    inconsistent_edges: int  # edges along which two faces run in the same direction, so that one of them is flipped
+    degenerate_faces: int  # faces without area, or with a repeated vertex
+    duplicate_faces: int  # faces with the same vertices as an earlier one, in the same or in the opposite order
+    duplicate_vertices: int  # vertices at exactly the position of an earlier one
+    unreferenced_vertices: int  # vertices without a face
     area: float
     lower: tuple[float, ...]  # corners of the bounding box of the faces
     upper: tuple[float, ...]
@@ -62,34 +62,37 @@ class SurfaceReport:
 
 @dataclass(frozen=True)
 class CloudReport:
-    """Counts and properties of a point cloud."""
+    """Numbers of points of a cloud, and whether it has normals and areas."""
 
     n_points: int
     has_normals: bool
     has_areas: bool
-    duplicate_points: int  # at exactly the position of an earlier one
+    duplicate_points: int  # points at exactly the position of an earlier one
     lower: tuple[float, ...]  # corners of the bounding box
     upper: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class TetReport:
-    """Elements and defects of a tet mesh."""
+    """Numbers of elements and defects of a tet mesh."""
 
     n_vertices: int
     n_tets: int
-    parts: int  # connected through shared faces
-    inside_out_tets: int  # given with negative volume; `TetMesh` has turned them
-    flat_tets: int  # with nearly zero volume
-    nonmanifold_faces: int  # with more than two tets
-    boundary_faces: int  # with a single tet
+    parts: int  # sets of tets that are connected through shared faces
+    inside_out_tets: int  # tets that were given with negative volume, and that `TetMesh` has flipped
+    flat_tets: int  # tets with nearly zero volume
+    nonmanifold_faces: int  # faces with more than two tets
+    boundary_faces: int  # faces with a single tet
     volume: float
     lower: tuple[float, ...]  # corners of the bounding box
     upper: tuple[float, ...]
 
 
 def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
-    """Count the elements and defects of a shape, in O(n) time; vertices that only rounding separates do not open it."""
+    """Count the elements and defects of a shape, in O(n) time.
+
+    Edges between vertices that only rounding separates do not count as open.
+    """
     if isinstance(shape, PointCloud):
         return CloudReport(
             n_points=shape.n_points,
@@ -105,6 +108,7 @@ def inspect(shape: Shape) -> SurfaceReport | CloudReport | TetReport:
 
 
 def _inspect_tets(mesh: TetMesh) -> TetReport:
+    """Count the elements and defects of a tet mesh."""
     counts = mesh.faces.tet_counts
     return TetReport(
         n_vertices=mesh.n_vertices,
@@ -121,7 +125,7 @@ def _inspect_tets(mesh: TetMesh) -> TetReport:
 
 
 def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
-    """Count what is wrong with a mesh, such as open edges, edges of several faces, and copies of faces."""
+    """Count the elements and defects of a mesh, such as open edges, edges of several faces, and duplicate faces."""
     if isinstance(mesh, TriangleMesh):
         corners, offsets = mesh.faces.ravel(), np.arange(0, 3 * mesh.n_faces + 1, 3)
     else:
@@ -163,7 +167,7 @@ def _inspect_surface(mesh: TriangleMesh | PolygonMesh) -> SurfaceReport:
 
 
 def _n_marked(n: int, ids: Ints) -> int:
-    """Count the distinct ids."""
+    """Count the distinct ids, which are below n."""
     return int(mask_of(n, ids).sum())
 
 

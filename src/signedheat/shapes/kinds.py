@@ -19,26 +19,26 @@ from .foreign import Shape as Shape
 from .geometries import HasGeoInterface
 
 EmbeddedSurface: TypeAlias = TriangleMesh | PolygonMesh | PointCloud | DigitalSurface
-"""Surfaces with positions in space, on which curves and points can lie."""
+"""Surfaces whose points have positions in space, on which curves and points can lie."""
 SurfaceDomain: TypeAlias = EmbeddedSurface | IntrinsicTriangulation
-"""Domains of distance along a surface."""
+"""Surfaces as domains of fields."""
 Domain: TypeAlias = SurfaceDomain | TetMesh | Grid[int]
-"""All domains of distance."""
+"""All domains on which distance can be computed."""
 AnySurface = TypeVar("AnySurface", bound=SurfaceDomain)
-"""One kind of surface, for functions whose result lies on a surface of the same kind."""
+"""A type of surface, for functions whose result lies on a surface of the same type as an argument."""
 ShapeLike: TypeAlias = Shape | ForeignShape
 """Shapes, including objects of trimesh, PyVista, meshio and Open3D, and pairs (vertices, faces)."""
 Shapes: TypeAlias = ShapeLike | Sequence[ShapeLike]
-"""One shape in space or several."""
+"""A shape in space, or a sequence of several."""
 PlanarGeometry: TypeAlias = HasGeoInterface | Mapping[str, object]
 """Geometries of shapely and GeoPandas, and GeoJSON."""
 Polylines: TypeAlias = Polyline | PlanarGeometry | Sequence[Polyline | PlanarGeometry]
-"""One line in the plane or several."""
+"""A line in the plane, or a sequence of several."""
 SpaceSource: TypeAlias = ShapeLike | Polyline | PlanarGeometry
-"""Sources of distance on grids."""
+"""Objects to which distance on a grid can be computed."""
 SpaceSources: TypeAlias = SpaceSource | Sequence[SpaceSource]
-"""One source of distance on grids or several."""
+"""A source of distance on grids, or a sequence of several."""
 Source: TypeAlias = SpaceSource | CurveOrPoints
-"""Sources of distance on any domain."""
+"""Objects to which distance can be computed on some domain."""
 Sources: TypeAlias = Source | Sequence[Source | Sequence[CurveOrPoints]]
-"""One source or several."""
+"""A source, or a sequence of several, in which curves and points may be grouped."""

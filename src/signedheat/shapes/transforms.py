@@ -1,4 +1,4 @@
-"""Shapes moved, turned, scaled or sheared; and several meshes joined to one."""
+"""Affine maps of shapes, and several meshes joined into one."""
 
 from __future__ import annotations
 
@@ -29,24 +29,24 @@ def transform(
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
     """Move, rotate, scale or shear a shape by an affine map.
 
-    What is inside stays inside: the faces of a mirrored shape are flipped. A solid stays a solid, as it was completed.
+    The faces of a mirrored shape are flipped, so that its normals still point outward. A solid keeps its completion.
 
     Parameters
     ----------
     shape : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
-        The shape; the boundary of voxels becomes a polygon mesh.
+        The shape.
     matrix : (4, 4) or (3, 4) float
-        ``x → M[:3, :3] x + M[:3, 3]``; the last row, if it is there, is 0 0 0 1.
+        Matrix M of the map ``x → M[:3, :3] x + M[:3, 3]``. A fourth row must be 0 0 0 1.
 
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, TetMesh or Solid
-        A shape of the same kind.
+        The transformed shape, of the same type. A `DigitalSurface` becomes a `PolygonMesh`.
 
     Raises
     ------
     GeometryError
-        If the matrix has another form, or flattens the shape.
+        If the matrix has another shape or last row, a number beyond 1e40, or no inverse.
 
     See Also
     --------
@@ -73,14 +73,15 @@ def transform(
     linear = whole[:, :3] / max(float(np.abs(whole[:, :3]).max()), SMALLEST_EXTENT)
     if abs(np.linalg.det(linear)) <= 1e-12 * np.linalg.norm(linear) ** 3:
         raise GeometryError("the transform flattens the shape", remedy="check the matrix", element="matrix")
-    stays = transformed.dispatch(type(shape)) is not transformed.dispatch(object)
-    return transformed(shape if stays else converted(shape), whole[:, :3], whole[:, 3])
+    is_known = transformed.dispatch(type(shape)) is not transformed.dispatch(object)
+    return transformed(shape if is_known else converted(shape), whole[:, :3], whole[:, 3])
 
 
 @singledispatch
 def transformed(
     shape: object, linear: Floats, move: Floats
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
+    """Transform a shape by ``x → linear x + move``, (3, 3) and (3,). Every type of shape registers a function."""
     raise UnsupportedTypeError(f"a {type(shape).__name__} cannot be transformed", remedy="transform what it is made of")
 
 
@@ -129,11 +130,11 @@ def _(shape: TetMesh, linear: Floats, move: Floats) -> TetMesh:
 
 
 Body: TypeAlias = tuple[Floats, Ints]
-"""(n, 3) vertices and (m, 3) faces."""
+"""Vertices, (n, 3), and faces, (m, 3), of a triangle mesh."""
 
 
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
-    """Join several meshes to one shape; return a single shape as it is. Tets count as their boundary."""
+    """Join several meshes into a triangle mesh; return a single mesh or cloud as it is. Tets become their boundary."""
     shapes = [part.boundary if isinstance(part, TetMesh) else part for part in as_shapes(shape)]
     if not shapes:
         raise SourceError("no shape was given", remedy="pass at least one")
@@ -157,19 +158,19 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
 
 
 def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats | float = 0.0) -> Body:
-    """Join the triangles of all meshes, with vertices relative to `origin`."""
+    """Return the vertices, relative to `origin`, and the triangles of several meshes, without merging vertices."""
     meshes = [part.triangulation for part in parts]
     return concatenated([(mesh.vertices - origin, mesh.faces) for mesh in meshes])
 
 
 def concatenated(bodies: Sequence[Body]) -> Body:
-    """Concatenate the vertices and faces of several bodies without merging any."""
+    """Return the vertices and faces of several bodies as those of one, without merging vertices."""
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
 def placed(body: Body, matrix: Floats) -> Body:
-    """Move a body by a (4, 3) matrix that multiplies rows from the right; a mirrored body keeps its outside."""
+    """Transform a body by a (4, 3) matrix M, ``x → x M[:3] + M[3]``; the faces of a mirrored body are flipped."""
     vertices, faces = body
     return vertices @ matrix[:3] + matrix[3], faces if np.linalg.det(matrix[:3]) >= 0 else faces[:, ::-1]
