@@ -188,7 +188,7 @@ class SheetWall:
     outward: Floats  # (r + 1, 2, 3) directions away from the surface at begin and end of each side; last 0, for −1
 
     @classmethod
-    def sides_at(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
+    def around(cls, sheet: Shapes, grid: Grid[Literal[3]], above: float, below: float) -> SheetWall:
         """Make the wall around meshes of triangles or polygons, to be evaluated on a grid."""
         for part in as_list(sheet):
             if area_elements(part).corners.shape[1:] != (3, grid.dimension):
