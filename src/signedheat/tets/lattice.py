@@ -1,9 +1,9 @@
 """Tet meshes around broken shapes: graded lattices, fine near the shape and coarse away from it.
 
-The mesh need not conform to the shape, since sources are clipped against the tets; so it can be made for every shape.
+The mesh need not conform to the shape, since sources are clipped against the tets. So it can be made for every shape.
 Across every face that two leaves of an octree share, their centres are joined by one tet for each edge of the face
 (edges are split where a smaller leaf splits them). Equal leaves give the body-centred cubic lattice, with dihedral
-angles of 60° and 90°; where sizes change angles stay between 30° and 135°.
+angles of 60° and 90°. Where sizes change, angles stay between 30° and 135°.
 
 Unstructured tets have no preferred directions: at the same size the unsharpened error is half as large, or less
 (``benchmarks/tets.py``).
@@ -31,11 +31,11 @@ from ..validation import finite_number, public_call, refuse_extreme
 from .tet_mesh import TetMesh
 
 FINEST_LATTICE = 1e9
-"""Largest resolution that is accepted; memory runs out before."""
+"""Largest resolution that is accepted; smaller ones may need too much memory."""
 MOST_TETS = 50_000_000
-"""Largest number of tets: distance on more would need over 70 GB."""
+"""Largest number of tets; distance on more would need over 70 GB."""
 BYTES_PER_LATTICE_TET = 350
-"""Measured peak memory of meshing; distance takes more."""
+"""Measured peak memory of meshing per tet; distance takes more."""
 
 
 @public_call
@@ -49,17 +49,17 @@ def tetrahedralize(
     shape : TriangleMesh, PolygonMesh or PointCloud
         Any shape, however broken.
     resolution : int
-        Number of lattice cells along the longest side of the shape's box, at the shape.
+        Number of cells near the shape along the longest side of its box.
     padding : float, optional
         Least distance between shape and box, in the units of the shape; by default a fifth of its longest side.
     grading : float
-        A cell is no larger than its distance from the shape divided by `grading`; at least 2.7. ``inf`` gives a
-        uniform lattice.
+        Cells are no larger than their distance from the shape divided by `grading`, which is at least 2.7. ``inf``
+        gives a uniform lattice.
 
     Returns
     -------
     TetMesh
-        All dihedral angles lie between 30° and 135°.
+        Tets that fill the box. All dihedral angles are between 30° and 135°.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def tetrahedralize(
 
 
 def sample_points(shape: Shape, spacing: float) -> Floats:
-    """Return points on a shape such that no point of it is farther than `spacing` from one of them."""
+    """(n, 3) points on a shape such that none of its points is farther than `spacing` from the nearest of them."""
     if isinstance(shape, PointCloud):
         return shape.points
     triangles = area_elements(shape).corners
@@ -132,7 +132,10 @@ def sample_points(shape: Shape, spacing: float) -> Floats:
 
 
 def _refuse_too_many(least: float, expected: float, resolution: float, power: int) -> None:
-    """Raise if a lattice has too many tets, and name a resolution that fits: their number grows with its `power`."""
+    """Raise `MemoryLimitError` if a lattice has too many tets, and name a resolution that fits.
+
+    It has at least `least` tets, and probably `expected`, whose number grows with this `power` of the resolution.
+    """
 
     def lower(fitting: int) -> str:
         most = resolution * (fitting / expected) ** (1 / power)
@@ -149,7 +152,11 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
 def _octree(
     samples: Any, origin: Floats, spacing: float, counts: Ints, depth: int, grading: float, resolution: float
 ) -> tuple[Ints, Ints]:
-    """Return lower corners and sizes of the leaves, in half cells of the finest level; they need no balancing."""
+    """(n, 3) lower corners and (n,) sizes of the leaves of an octree, in half cells of the finest level.
+
+    Cells are split up to `depth` times if they are nearer to the samples than `grading` times their size. The coarsest
+    level has (3,) `counts` of cells, the finest cells of size `spacing`. Leaves need no balancing.
+    """
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
     octants = np.array(list(itertools.product((0, 1), repeat=3)))
@@ -169,7 +176,10 @@ def _octree(
 
 
 def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
-    """Return points, in half cells of the finest level, and the tets that join the centres of leaves sharing a face."""
+    """Make the tets that join the centres of leaves that share a face: (k, 3) points, and (m, 4) tets.
+
+    Points, and the upper corner of the lattice, `upper`, are in half cells of the finest level.
+    """
     stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
@@ -178,7 +188,7 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
         return places_among(leaves, keys) >= 0
 
     octants = np.array(list(itertools.product((0, 1), repeat=3)))
-    taken = np.unique((corners[:, None] + octants * sizes[:, None, None]).reshape(-1, 3) @ stride)
+    occupied = np.unique((corners[:, None] + octants * sizes[:, None, None]).reshape(-1, 3) @ stride)
     joined = []
     for axis, side in itertools.product(range(3), (0, 1)):
         step = np.zeros(3, dtype=np.int64)
@@ -199,7 +209,7 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
         for k in range(4):
             start, end = face[:, k], face[:, (k + 1) % 4]
             middle = (start + end) // 2
-            split = places_among(taken, middle @ stride) >= 0
+            split = places_among(occupied, middle @ stride) >= 0
             whole = ~split
             for ends, which in (((start, end), whole), ((start, middle), split), ((middle, end), split)):
                 parts = (center[chosen], opposite[chosen], *ends)
@@ -208,13 +218,16 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
     points = np.stack([keys // stride[0], keys % stride[0] // stride[1], keys % stride[1]], axis=1)
     tets = ids.reshape(-1, 4)
     a, b, c, d = (points[tets[:, k]] for k in range(4))
-    turned = np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) < 0
-    tets[turned] = tets[turned][:, [0, 1, 3, 2]]
+    negative = np.einsum("mi,mi->m", np.cross(b - a, c - a), d - a) < 0
+    tets[negative] = tets[negative][:, [0, 1, 3, 2]]
     return points, tets
 
 
 def _box_around(shape: Any, resolution: int, padding: float | None) -> tuple[Floats, Floats, float]:
-    """Return the lower corner and the sides of the padded box of a shape, and the edge length; check the parameters."""
+    """Return the (3,) lower corner and (3,) sides of the padded box of a shape, and the size of cells near the shape.
+
+    Raise `GeometryError` if a parameter is out of range.
+    """
     lower, upper = bounds_around([shape])
     longest = float((upper - lower).max())
     if len(lower) != 3 or not longest > 0:

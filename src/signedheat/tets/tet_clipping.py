@@ -18,23 +18,23 @@ from ..mesh.tet_shapes import TetShapes, inside_out
 from ..parallel import ROWS_PER_TASK, in_chunks
 
 SOURCELESS_TET = 1e-10
-"""Tets whose volume, relative to the cube of the longest edge, is below this contain no part of a source."""
+"""Tets with less volume than this, relative to the cube of their longest edge, contain no part of a source."""
 IN_FACE_PLANE = 1e-9
-"""Distance, relative to the size of a face, within which a point counts as lying in its plane."""
+"""A point lies in the plane of a face up to this distance, relative to the size of the face."""
 SIGHT_OUTSIDE = 1e-6
-"""Length, relative to the size of the tets, by which a line of sight may lie outside the mesh."""
+"""A line of sight may lie outside the mesh by this length, relative to the size of the tets."""
 
 
 @dataclass(frozen=True, eq=False)
 class ClippedPolygons:
-    """Convex polygons, each the part of a source in one tet."""
+    """Convex polygons, each the part of a triangle or point of a source that lies in one tet."""
 
-    tets: Ints  # (p,) the tet that each lies in
+    tets: Ints  # (p,) the tet that each polygon lies in
     parents: Ints  # (p,) the triangle or point of the source that each is part of
     area_vectors: Floats  # (p, 3) area times normal
     areas: Floats  # (p,)
-    barycentric: Floats  # (p, 4) coordinates of each centroid in its tet
-    in_face: Ints  # (p,) the corner opposite the face that it lies in, −1 in the interior of the tet
+    barycentric: Floats  # (p, 4) barycentric coordinates of each centroid in its tet
+    in_face: Ints  # (p,) the corner of the tet opposite the face that it lies in; −1 for those in no face
 
 
 class Planes(NamedTuple):
@@ -77,7 +77,7 @@ class Planes(NamedTuple):
 
 
 def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> ClippedPolygons:
-    """Clip (k, 3, 3) triangles against the tets that they cross; parts outside the mesh are dropped."""
+    """Clip (k, 3, 3) triangles against the tets of a mesh; parts outside the mesh are dropped."""
     parts = []
     for begin in range(0, max(len(triangles), 1), ROWS_PER_TASK):  # most tets near a triangle contain no part of it
         chunk = triangles[begin : begin + ROWS_PER_TASK]
@@ -91,7 +91,7 @@ def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> Clippe
 
 
 def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
-    """Return (k,) a tet that contains each point, −1 outside the mesh."""
+    """(k,) a tet that contains each of (k, 3) points; −1 outside the mesh."""
 
     def located(chunk: Floats) -> tuple[Ints]:
         near = mesh.search_tree.meeting(np.repeat(chunk[:, None], 3, axis=1), slack)
@@ -102,13 +102,13 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
 
 
 def _slack(mesh: TetShapes) -> float:
-    """Return by how much boxes of tets are enlarged in a search, since rounding may put a point outside."""
+    """Return the length by which boxes of tets are enlarged in a search, since rounding may put a point outside."""
     lower, upper = mesh.search_tree.bounds[1].reshape(2, 3)
     return 1e-9 * float((upper - lower).max())
 
 
 def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
-    """Return (k, 4) barycentric coordinates of points in given tets, clamped to be nonnegative, with sum one."""
+    """(k, 4) barycentric coordinates of (k, 3) points in (k,) tets, clamped to at least 0, with sum 1."""
     from_corner = points[:, None] - mesh.vertices[mesh.tets[tets][:, [1, 0, 0, 0]]]  # on the face opposite each corner
     inward = -np.einsum("pki,pki->pk", mesh.area_vectors[tets], from_corner)
     inward = np.maximum(inward / np.maximum(np.abs(inward).max(axis=1, keepdims=True), np.finfo(float).tiny), 0)
@@ -119,7 +119,10 @@ def barycentric(mesh: TetShapes, tets: Ints, points: Floats) -> Floats:
 
 @compiled
 def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> float:
-    """Return by how much a point, relative to the centre, lies outside the face opposite corner k of a tet."""
+    """Return the distance by which a point is outside of the face opposite corner k of a tet, negative inside.
+
+    The point is relative to the centre of the mesh.
+    """
     f = planes.tet_faces[tet, k]
     height = planes.normals[f, 0] * x + planes.normals[f, 1] * y + planes.normals[f, 2] * z - planes.offsets[f]
     return planes.signs[tet, k] * height
@@ -127,7 +130,10 @@ def beyond(planes: Planes, tet: int, k: int, x: float, y: float, z: float) -> fl
 
 @compiled
 def _locate(planes: Planes, points: Floats, starts: Ints, near: Ints) -> Ints:
-    """Return (k,) the tet, of those `near`, in which each point lies deepest; −1 if it lies in none."""
+    """(k,) the tet in which each of (k, 3) points lies deepest, of those in ``near[starts[p]:starts[p + 1]]``; or −1.
+
+    Points are relative to the centre of the mesh.
+    """
     tets = np.full(len(points), -1, dtype=np.int64)
     for p in range(len(points)):
         deepest = -np.inf
@@ -146,7 +152,11 @@ def _locate(planes: Planes, points: Floats, starts: Ints, near: Ints) -> Ints:
 
 @compiled
 def _clip(planes: Planes, triangles: Floats, parents: Ints, tets: Ints) -> tuple[Floats, Floats, Floats, Ints]:
-    """Return area vector, area and centroid of each triangle's part in a tet, and the face of the tet it lies in."""
+    """Clip triangle `parents[k]` to tet `tets[k]`, for p pairs of both.
+
+    Return (p, 3) area vectors, (p,) areas, 0 if there is no common part, (p, 3) centroids, and (p,) the corners
+    opposite the faces that parts lie in, or −1. Parts in a face are shared equally by its tets.
+    """
     area_vectors, centers = np.zeros((len(tets), 3)), np.zeros((len(tets), 3))
     areas, in_face = np.zeros(len(tets)), np.full(len(tets), -1)
     polygon, other, heights, normal = np.empty((8, 3)), np.empty((8, 3)), np.empty(8), np.empty(3)
@@ -182,7 +192,11 @@ def _clip(planes: Planes, triangles: Floats, parents: Ints, tets: Ints) -> tuple
 def _cut(
     planes: Planes, tet: int, corner: int, polygon: Floats, n: int, other: Floats, heights: Floats
 ) -> tuple[int, bool]:
-    """Clip a polygon to the inner side of a tet's face; return its size, and whether it lies in the face's plane."""
+    """Clip the first n points of a polygon to the inner side of the face of a tet opposite `corner`, in place.
+
+    Return the new number of points, and whether the polygon lies in the plane of the face. `other` and `heights` are
+    working memory.
+    """
     most, least = 0.0, 0.0
     for i in range(n):  # heights and crossings are the same, to the last bit, for the tets on both sides
         height = beyond(planes, tet, corner, polygon[i, 0], polygon[i, 1], polygon[i, 2])
@@ -211,7 +225,10 @@ def _cut(
 
 @compiled
 def _measure(polygon: Floats, n: int, normal: Floats, area_vector: Floats, center: Floats) -> float:
-    """Write area vector and centroid of a convex polygon; return its area, negative if rounding has turned it over."""
+    """Return the area of a convex polygon of n points, negative if rounding has flipped it over from its `normal`.
+
+    Write its area vector and centroid to `area_vector` and `center`.
+    """
     area_vector[:] = 0.0
     center[:] = 0.0
     total = 0.0
@@ -238,15 +255,18 @@ def _measure(polygon: Floats, n: int, normal: Floats, area_vector: Floats, cente
 def stays_inside(
     planes: Planes, neighbors: Ints, tet: int, x: float, y: float, z: float, u: float, w: float, t: float, slack: float
 ) -> bool:
-    """Return whether the segment from (x, y, z), in a tet, to (u, w, t), in the mesh, lies in the mesh."""
+    """Whether the segment from (x, y, z), in tet `tet`, to (u, w, t) lies in the mesh, up to `slack`.
+
+    `neighbors` are the (m, 4) tets beyond faces, or −1.
+    """
     for _ in range(len(neighbors)):
-        leave, at = -1, np.inf
+        leave, crossing = -1, np.inf
         for k in range(4):
             there = beyond(planes, tet, k, u, w, t)
             if there > slack:
                 here = beyond(planes, tet, k, x, y, z)
-                if there > here and -here / (there - here) < at:
-                    leave, at = k, -here / (there - here)
+                if there > here and -here / (there - here) < crossing:
+                    leave, crossing = k, -here / (there - here)
         if leave < 0:
             return True
         tet = neighbors[tet, leave]
@@ -257,7 +277,7 @@ def stays_inside(
 
 @compiled
 def visible(planes: Planes, neighbors: Ints, starts: Floats, targets: Floats, slack: float) -> Bools:
-    """Return (m,) whether the segment from a point in each tet to its target stays in the mesh, to within `slack`."""
+    """(m,) whether segments from (m, 3) starts, one in each tet, to (m, 3) targets lie in the mesh, up to `slack`."""
     seen = np.empty(len(starts), dtype=np.bool_)
     for tet in range(len(starts)):
         x, y, z = starts[tet]

@@ -1,4 +1,4 @@
-"""Tet meshes as a discretisation: one vector per face, one value per vertex (Sec. 8.1)."""
+"""Tet meshes discretised for the signed heat method: one vector per face, and one value per vertex (Sec. 8.1)."""
 
 from __future__ import annotations
 
@@ -25,24 +25,25 @@ from .tet_mesh import TetMesh
 from .tet_source import TetSource, tet_source
 
 DIRECT_FACES = 20_000
-"""Number of faces up to which step 1 is factorised, in O(n²) time; conjugate gradients take O(n⁴ᐟ³)."""
+"""With at most this number of faces, the matrix of step 1 is factorised, in O(n²) time. With more, conjugate gradients
+take O(n⁴ᐟ³)."""
 DIRECT_VERTICES = 40_000
-"""Number of vertices up to which step 3 is factorised."""
+"""With at most this number of vertices, the matrix of step 3 is factorised; with more, conjugate gradients are used."""
 DIRECTION_ERROR = 1e-3
-"""Componentwise residual at which conjugate gradients stop: directions are then right to about 0.01°."""
+"""Componentwise residual at which conjugate gradients stop; directions are then exact to about 0.01°."""
 TET_SPRINGS = 30.0
 """Strength of the springs that impose levels, times the mean edge length."""
 
 
 def memory_estimate(n_tets: int) -> float:
-    """Estimate the peak memory, in bytes, of a first distance on a mesh of this many tets."""
+    """Return the estimated peak memory, in bytes, of the first distance on a mesh of this many tets."""
     factored = min(n_tets, DIRECT_FACES // 2)  # a tet has about two faces of its own
     return max(1750 * n_tets, 2900 * factored)  # measured, by conjugate gradients and by factorisation
 
 
 @dataclass(frozen=True, eq=False)
 class TetDiscretization(DiffusesEach):
-    """The discretisation of a tet mesh."""
+    """A tet mesh discretised for the signed heat method; see `Discretization` for its methods."""
 
     mesh: TetMesh
     direct: bool  # whether the system of step 1 is factorised; it is solved by conjugate gradients otherwise
@@ -55,14 +56,17 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def spacing(self) -> float:
-        """h: mean distance between the barycentres of two faces of a tet, which is a third of an edge length."""
+        """h: the mean distance between the barycentres of two faces of a tet, a third of the mean edge length."""
         corners = self.mesh.vertices[self.mesh.tets]
         pairs = [corners[:, a] - corners[:, b] for a in range(4) for b in range(a)]
         return float(np.mean([np.linalg.norm(edge, axis=1).mean() for edge in pairs])) / 3
 
     @cached_property
     def unknowns(self) -> Ints:
-        """(m, 4) unknown of φ at each corner of each tet; heat flows through faces only, so parts share none."""
+        """(m, 4) unknown of φ at each corner of each tet.
+
+        Heat flows through faces only, so parts that share just a vertex or an edge have unknowns of their own there.
+        """
         parts = self.mesh.parts
         keys = self.mesh.tets * (parts.max() + 1) + parts[:, None]
         return np.unique(keys, return_inverse=True)[1].reshape(-1, 4)
@@ -82,6 +86,7 @@ class TetDiscretization(DiffusesEach):
         return TetIntegration(matrix, factorize=from_first, spring=1e4, strength=strength, gradients=self._gradients)
 
     def _gradients(self, values: Floats) -> Floats:
+        """(n, 3) mean gradients at the unknowns of (n,) values, 0 where there are none."""
         return np.nan_to_num(self.mesh.geometry.mean_gradients(values, self.unknowns, self.n_unknowns))
 
     def adapt(self, sources: Sequence[Any]) -> tuple[TetDiscretization, Sequence[Any]]:
@@ -89,14 +94,14 @@ class TetDiscretization(DiffusesEach):
         return self, sources
 
     def lower(self, sources: Sequence[Any], diffusion: float) -> TetSource:
-        """Compute X₀ (Sec. 8.1; Eq. 11 in space) and the rows that average φ over the sources (Eq. 14)."""
+        """Make a `TetSource`: X₀ (Sec. 8.1; Eq. 11 in space), and the rows that average φ over the sources (Eq. 14)."""
         return tet_source(self.mesh, self.planes, self.unknowns, sources, diffusion, self.spacing)
 
     def diffuse(self, source: TetSource) -> Floats:
-        """Solve ``(M + tL) X = X₀`` (Eq. 12) for one vector per face, and average it in the tets (App. B.2).
+        """Solve ``(M + tL) X = X₀`` (Eq. 12) for one vector per face; return (m, 3) means in the tets (App. B.2).
 
-        Vectors diffuse without turning. Where no straight line to the source stays in the domain, the direction is that
-        in which undirected heat falls (Crane et al. 2013), with the sign of the place it comes from.
+        Vectors diffuse without rotation. Where no straight line to the source stays in the domain, the direction is
+        that in which scalar heat falls (Crane et al. 2013), with its sign at the tet where this heat comes from.
         """
         heat = self._heats(source.time, lambda: self._heat_system(source.time))
         if self._is_convex:
@@ -111,15 +116,15 @@ class TetDiscretization(DiffusesEach):
         return np.where(straight[:, None], vectors, side[:, None] * falling)
 
     def _heat_system(self, time: float) -> HeatSystem:
-        """Return M + tL of Eq. 12, from the Laplacian of Eq. 21 and the mass of Eq. 23, lumped."""
+        """Return the system M + tL of Eq. 12, from the Laplacian of Eq. 21 and the lumped mass of Eq. 23."""
         matrix, mass = self._laplacian * time, self.mesh.geometry.face_mass()
         matrix.setdiag(matrix.diagonal() + mass)
         return HeatSystem(matrix, self.direct)
 
     def _in_tets(self, stages: list[Stage]) -> tuple[Floats, Floats, Floats]:
-        """Return (m, k) means of X in tets, (m, 3) gradients of its last column, and (m,) logarithms of their scales.
+        """(m, k) means of X in tets, (m, 3) gradients of its last column, and (m,) logarithms of the scales of both.
 
-        All are those of the last stage that has the four faces of a tet.
+        Each is from the last stage that has values at the four faces of the tet.
         """
         tet_faces = self.mesh.faces.tet_faces
         n = self.mesh.n_tets
@@ -133,7 +138,7 @@ class TetDiscretization(DiffusesEach):
         return means, gradients, factors
 
     def _straight(self, source: TetSource) -> Bools:
-        """Return (m,) whether the source reaches each tet along a straight line."""
+        """(m,) whether the segment from each tet to the nearest part of the source lies in the mesh."""
         planes, centers = self.planes, self.mesh.tet_barycenters
         nearest = source.centers[PointTree(source.centers).query(centers)[1]]
         begins, ends = (np.ascontiguousarray(points - planes.center) for points in (centers, nearest))
@@ -141,10 +146,11 @@ class TetDiscretization(DiffusesEach):
 
     @cached_property
     def _laplacian(self) -> sparse.csr_matrix:
+        """(f, f) Laplacian L on the faces (Eq. 21)."""
         return self.mesh.geometry.face_laplacian()
 
     def to_cells(self, vectors: Floats) -> Floats:
-        """Return X at the tets, where `diffuse` has averaged it already."""
+        """Return the (m, 3) vectors as they are, since `diffuse` has averaged them in the tets."""
         return vectors
 
     @cached_property
@@ -157,18 +163,18 @@ class TetDiscretization(DiffusesEach):
         return bool(self.mesh.tet_volumes.sum() >= (1 - 1e-9) * hull.volume)
 
     def divergence(self, directions: Floats) -> Floats:
-        """Compute b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22)."""
+        """(n,) b, the right-hand side of ``C φ = b`` (Eq. 13, Eq. 22), for (m, 3) directions in tets."""
         return self.mesh.geometry.divergence(directions, self.unknowns, self.n_unknowns)
 
     @cached_property
     def vertices(self) -> Ints:
-        """(n,) the vertex of the mesh that each unknown belongs to."""
+        """(n,) vertex of the mesh that each unknown belongs to."""
         vertices = np.empty(self.n_unknowns, dtype=np.int64)
         vertices[self.unknowns] = self.mesh.tets
         return vertices
 
     def at_vertices(self, values: Floats) -> Floats:
-        """Return (n_vertices,) means of values over the unknowns of each vertex, NaN where none has a value."""
+        """(n_vertices,) means of (n,) values over the unknowns of each vertex, NaN where none has a value."""
         finite = np.flatnonzero(~np.isnan(values))
         vertices, n = self.vertices[finite], self.mesh.n_vertices
         counts, sums = np.bincount(vertices, minlength=n), np.bincount(vertices, values[finite], n)
@@ -179,8 +185,8 @@ class TetDiscretization(DiffusesEach):
 class HeatSystem:
     """The system of step 1, ``(M + tL) X = X₀``, whose solutions decay away from the right-hand side."""
 
-    matrix: sparse.csr_matrix  # (n, n) M + tL, whole
-    direct: bool  # whether it is factorised; it is solved by conjugate gradients otherwise
+    matrix: sparse.csr_matrix  # (n, n) M + tL, both triangles of it
+    direct: bool  # whether it is factorised; otherwise it is solved by conjugate gradients
 
     @cached_property
     def factor(self) -> Factor:
@@ -188,11 +194,12 @@ class HeatSystem:
         return factorize(self.matrix)
 
     def solve(self, loads: Floats) -> list[Stage]:
-        """Solve for columns (n, k), in stages: X underflows a few hundred cells away from the loads."""
+        """Solve for the columns of (n, k) loads, in stages, since X underflows a few hundred cells away from them."""
         size = float(self.matrix.diagonal().mean())
         return solve_with_restarts(self._solve, matrix_forces(self.matrix), loads, size)
 
     def _solve(self, loads: Floats) -> Floats:
+        """(n, k) solutions for (n, k) loads, without restarts at underflow."""
         if self.direct:
             return self.factor.solve(loads)
         order = outward_order(self.matrix, np.flatnonzero(loads.any(axis=1)))
@@ -200,7 +207,10 @@ class HeatSystem:
 
 
 def uphill_roots(heights: Floats, neighbors: Ints, settled: Bools) -> Ints:
-    """Return (m,) the settled tet, or the local maximum, that steepest ascent from tet to tet leads to."""
+    """(m,) the settled tet, or the local maximum of the (m,) heights, to which steepest ascent from each tet leads.
+
+    Ascent is from a tet to the highest of its (m, 4) neighbours, −1 for none.
+    """
     own = np.arange(len(heights))
     around = np.where(neighbors >= 0, heights[neighbors], -np.inf)
     best = around.argmax(axis=1)
@@ -215,6 +225,7 @@ def uphill_roots(heights: Floats, neighbors: Ints, settled: Bools) -> Ints:
 
 @discretize.register
 def _(domain: TetMesh) -> TetDiscretization:
+    """Discretise a tet mesh, or raise `MemoryLimitError` if distance on it does not fit in memory."""
     refuse_beyond_memory(
         f"distance on {domain.n_tets:,} tets",
         domain.n_tets,
@@ -225,7 +236,7 @@ def _(domain: TetMesh) -> TetDiscretization:
 
 
 def lowered_tets(mesh: TetMesh) -> TetDiscretization:
-    """Return the discretisation of a mesh, without checking whether distance on it fits into memory."""
+    """Discretise a tet mesh without checking whether distance on it fits into memory."""
     return TetDiscretization(mesh, direct=len(mesh.faces.vertices) <= DIRECT_FACES)
 
 
@@ -236,12 +247,15 @@ class TetIntegration(SpringIntegration):
     gradients: Callable[[Floats], Floats] = np.zeros_like  # from φ at the unknowns to (n, 3) gradients there
 
     def corrected(self, levels: Floats, solve: Callable[[Floats], Floats], source: SourceTerm) -> tuple[Floats, Floats]:
-        """Return the levels minus the quadratic correction of a first solution, and the solution with these levels."""
+        """Return (s,) levels, less the quadratic correction of a first solution, and the solution with these levels.
+
+        `solve` returns φ for given levels.
+        """
         values = levels - self._quadratic_correction(solve(levels), source)
         return values, solve(values)
 
     def fit_exactly(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Impose levels at the samples exactly (Eq. 14)."""
+        """Return the φ that has given levels at the samples exactly (Eq. 14)."""
         correction = self._quadratic_correction(self.factor.solve(divergence), source)
         return super().fit_exactly(divergence, source, replace(levels, values=levels.values - correction))
 
@@ -253,10 +267,10 @@ class TetIntegration(SpringIntegration):
         return super().penalize(divergence - pull, source, strength)
 
     def _at_samples(self, values: Floats, source: SourceTerm) -> Floats:
-        """Return values at the samples of a source, to second order."""
+        """(s,) means of φ, (n,) values, over the patches of a source, to second order."""
         return super()._at_samples(values, source) + self._quadratic_correction(values, source)
 
     def _quadratic_correction(self, values: Floats, source: SourceTerm) -> Floats:
-        """Return (s,) means of φ minus its linear interpolant, over the patches of the source."""
+        """(s,) means of φ minus its linear interpolant, over the patches of the source."""
         assert isinstance(source, TetSource)
         return source.quadratic_correction @ self.gradients(np.nan_to_num(values)).ravel()

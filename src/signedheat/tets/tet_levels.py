@@ -25,7 +25,7 @@ TET_CUTS = {
     2: [[(0, 2), (0, 3), (1, 3)], [(0, 2), (1, 3), (1, 2)]],
     3: [[(0, 1), (0, 3), (0, 2)]],
 }
-# Likewise, triangles of the part of a boundary face below the level; (k, k) is corner k itself.
+# In the same way, triangles of the part of a boundary face below the level; (k, k) is corner k itself.
 FACE_LIDS = {
     1: [[(0, 0), (0, 1), (0, 2)]],
     2: [[(0, 0), (1, 1), (1, 2)], [(0, 0), (1, 2), (2, 0)]],
@@ -34,9 +34,10 @@ FACE_LIDS = {
 
 
 def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: float) -> tuple[Floats, Ints]:
-    """Return vertices and triangles of the surface around the mesh vertices below a level, closed at the boundary.
+    """Extract the surface around the mesh vertices below a level: (k, 3) vertices and (t, 3) triangles.
 
-    Vertices lie where φ, by values and gradients at the ends of edges, takes the level. Tets with NaN are left out.
+    It faces greater values, and is closed along the boundary of the mesh. Its vertices lie on edges, where φ equals the
+    level by its (n,) values and (n, 3) gradients at their ends. Tets with NaN are left out.
     """
     tets = mesh.tets[~np.isnan(values[mesh.tets]).any(axis=1)]
     if not len(tets):
@@ -59,7 +60,10 @@ def closed_level_set(mesh: TetShapes, values: Floats, gradients: Floats, level: 
 
 
 def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) -> tuple[Floats, Ints, Ints]:
-    """Return the level set of the linear interpolant, open at the boundary: positions, triangles, their tets."""
+    """Extract the level set of (n,) values, linear in tets: (k, 3) positions, (t, 3) triangles, and their (t,) tets.
+
+    It is open at the boundary of the mesh. Tets with NaN are left out.
+    """
     finite = np.flatnonzero(~np.isnan(values[tets]).any(axis=1))
     keys, owners = _triangles(tets[finite], (values < level)[tets[finite]], len(vertices), TET_CUTS)
     return *_crossings(vertices, values, np.zeros_like(vertices), level, keys, 0.0), finite[owners]
@@ -68,9 +72,11 @@ def level_triangles(vertices: Floats, tets: Ints, values: Floats, level: float) 
 def _crossings(
     vertices: Floats, values: Floats, gradients: Floats, level: float, keys: Ints, clearance: float
 ) -> tuple[Floats, Ints]:
-    """Return where edges, given by keys ``smaller · n + larger``, take the level, and the index of each key's place.
+    """Find the points where φ equals a level, on edges with (t, 3) keys ``smaller · n + larger`` of their vertex ids.
 
-    At the fraction s of the edge e from a to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``.
+    Return (k, 3) positions, one for each distinct key, and (t, 3) their indices. At the fraction s of the edge e from a
+    to b, φ is ``(1 − s) φ_a + s φ_b + ½ s (1 − s) (∇φ_a − ∇φ_b)·e``. Points are at least `clearance` of the length of
+    the edge away from its ends.
     """
     crossings, triangles = np.unique(keys, return_inverse=True)
     low, high = crossings // len(vertices), crossings % len(vertices)
@@ -85,7 +91,11 @@ def _crossings(
 def _triangles(
     elements: Ints, below: Bools, n: int, table: dict[int, list[list[tuple[int, int]]]]
 ) -> tuple[Ints, Ints]:
-    """Cut elements by a table: return (k, 3) triangles of keys of edges (see `_crossings`), and their elements."""
+    """Cut tets, (m, 4), or triangles, (m, 3), by a table such as `TET_CUTS`.
+
+    Return triangles, as (t, 3) keys of the edges on which their corners lie (see `_crossings`), and (t,) the elements
+    that they are in. `below` tells which corners are below the level.
+    """
     corners = elements.shape[1]
     masks = below @ (1 << np.arange(corners))
     if corners == 4:

@@ -41,8 +41,9 @@ class TetMesh(Displayed, Frozen, FieldDomain):
     vertices : (n, 3) float
         Positions; vertices that no tet uses are allowed.
     tets : (m, 4) int
-        Vertex ids. As seen from the first corner the other three run clockwise if the volume is positive; tets with
-        negative volume are flipped (their last two corners swapped) and listed in `reoriented`. Flat tets are allowed.
+        Vertex ids of each tet. Seen from the first corner, the other three run clockwise if the volume is positive.
+        Tets with negative volume are flipped, by swapping their last two corners, and listed in `reoriented`. Flat tets
+        are allowed.
 
     Attributes
     ----------
@@ -120,12 +121,12 @@ class TetMesh(Displayed, Frozen, FieldDomain):
 
     @cached_property
     def boundary(self) -> TriangleMesh:
-        """The faces with a single tet, oriented outward, on the vertices of this mesh."""
+        """The faces with a single tet, facing outwards, on the vertices of this mesh."""
         return TriangleMesh(self.vertices, self.faces.vertices[self.faces.tet_counts == 1])
 
     @cached_property
     def parts(self) -> Ints:
-        """(m,) connected component of each tet, through shared faces."""
+        """(m,) connected component of each tet, connected by shared faces."""
         return element_components(self.faces.tet_faces)
 
     @cached_property
@@ -171,7 +172,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         Parameters
         ----------
         mesh : meshio.Mesh
-            With cells ``"tetra"``.
+            A mesh with cells of the type ``"tetra"``.
 
         Returns
         -------
@@ -206,7 +207,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         Returns
         -------
         meshio.Mesh
-            With cells ``"tetra"``.
+            The vertices, and cells of the type ``"tetra"``.
 
         Raises
         ------
@@ -231,7 +232,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
         Parameters
         ----------
         grid : pyvista.UnstructuredGrid
-            With cells of the type ``TETRA``.
+            A grid with cells of the type ``TETRA``.
 
         Returns
         -------
@@ -286,16 +287,16 @@ class TetMesh(Displayed, Frozen, FieldDomain):
 
 @dataclass(frozen=True, eq=False)
 class TetInterpolant:
-    """Interpolation to second order, from values and gradients at the corners of tets.
+    """Interpolation of second order, from values and gradients at the corners of tets.
 
-    Outside the mesh it continues linearly from the nearest point of the boundary.
+    Outside the mesh, values are extrapolated linearly from the nearest point of the boundary.
     """
 
     mesh: TetMesh
     values: Floats  # at the vertices, NaN where there are none
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """Return (...) values at (..., 3) points; NaN where the nearest tet has a vertex without a value."""
+        """(...) values at (..., 3) points; NaN where the nearest tet has a vertex without a value."""
         places, shape = query_points(points, 3)
         corners, weights, away = self._located(places)
         steps = (places - away)[:, None] - self.mesh.vertices[corners]
@@ -315,15 +316,19 @@ class TetInterpolant:
 
     @property
     def cell_gradients(self) -> Floats:
-        """(m, 3) gradient of the linear interpolant in every tet."""
+        """(m, 3) gradient of the linear interpolant in each tet."""
         return self.mesh.geometry.gradients(self.values[self.mesh.tets])
 
     @cached_property
     def _vertex_gradients(self) -> Floats:
+        """(n, 3) volume-weighted means at the vertices of the gradients in tets."""
         return self.mesh.geometry.mean_gradients(self.values, self.mesh.tets, self.mesh.n_vertices)
 
     def _located(self, points: Floats) -> tuple[Ints, Floats, Floats]:
-        """Return (k, 4) vertices and their weights at the closest point of the mesh, and (k, 3) vectors from there."""
+        """Find the closest points of the mesh to (k, 3) points, and the vectors from there.
+
+        Return (k, 4) vertices around each closest point, (k, 4) their weights, and (k, 3) vectors, 0 for points inside.
+        """
         mesh = self.mesh
         tets = containing_tets(mesh.geometry, mesh._planes, points)
         inside, outside = np.flatnonzero(tets >= 0), np.flatnonzero(tets < 0)

@@ -1,10 +1,10 @@
 """Sharpening on tets: distance to faces and to the zero set along straight lines, which bend around the boundary.
 
 Where the segment from a vertex to the nearest point of the surface lies in the mesh, its length is the distance.
-Elsewhere shortest paths bend at the boundary of the mesh. They are found vertex by vertex, in order of distance: each
-vertex takes over from a neighbour the triangle, or the bend, that the neighbour's path starts from, if that is visible
-from the vertex too; otherwise the path bends at the neighbour (any-angle search, Nash et al. 2007). Bending at vertices
-only, instead of anywhere on an edge, costs a length of second order.
+Elsewhere shortest paths bend at the boundary of the mesh. They are found vertex by vertex, in order of distance. The
+path of a vertex starts from the same triangle, or last bend, as that of a neighbour, if this is visible from it.
+Otherwise it bends at the neighbour (any-angle search, Nash et al. 2007). Since paths bend at vertices only, instead of
+anywhere on an edge, they are too long by an error of second order.
 """
 
 from __future__ import annotations
@@ -37,14 +37,15 @@ from .tet_levels import level_triangles
 from .tet_mesh import TetMesh
 
 FACE_EDGES = 2.0
-"""Distance from a face, in mean edges, within which its side decides the sign, and beyond which from all faces the zero
-set completes the shape."""
+"""Within this distance of a face, in mean edges, its side decides the sign; farther from all faces, the zero set
+completes the shape."""
 
 
 @sharpen_on.register
 def _(
     mesh: TetMesh, field: Field[TetMesh], source: Shapes | None, method: Method | None, progress: Progress | None
 ) -> Field[TetMesh]:
+    """Sharpen a field on a tet mesh, to the zero set and to the faces of `source` if there is one."""
     lowered = lowered_tets(mesh)  # nothing is solved on it
     elements = LinearElements.on_tets(mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     given = None if source is None else as_shapes(source)
@@ -64,8 +65,8 @@ def _(
 ) -> Nearest:
     """Measure any-angle distance to the given faces, and to the zero set where it is over `FACE_EDGES` from all.
 
-    Within `FACE_EDGES` of a face its side decides the sign, where the shape is closed and consistent around the nearest
-    place.
+    Within `FACE_EDGES` of a face its side decides the sign, where the shape is closed and consistently oriented around
+    the nearest point.
     """
     points = lowered.mesh.vertices[lowered.vertices] - lowered.planes.center
     positions, corners, owners = level_triangles(points, lowered.unknowns, values, 0.0)
@@ -95,7 +96,7 @@ def _(
 
 
 def _faces_of(shapes: Sequence[SurfaceShape], center: Floats) -> FaceFeatures | None:
-    """Return the faces of some shapes, relative to a centre; None if no face has any extent."""
+    """Return the faces of some shapes, with positions relative to a centre; None if no face has any extent."""
     meshes = [shape for shape in shapes if not isinstance(shape, PointCloud)]
     if len(meshes) != len(shapes):
         raise SourceError("fields on tets are sharpened to faces, and points have none", element="shape")
@@ -118,7 +119,7 @@ class SourceSurface(NamedTuple):
     """The triangles that distance is measured to."""
 
     rows: Floats  # (k, 16) see `triangle_rows`, relative to the centre of the mesh
-    corners: Ints  # (k, 3) vertex ids; corners at one place have the same id
+    corners: Ints  # (k, 3) vertex ids; corners at the same position have the same id
     # the triangles at vertex id v are ``triangles_at[first_triangle[v] : first_triangle[v + 1]]``
     first_triangle: Ints
     triangles_at: Ints
@@ -128,9 +129,12 @@ class SourceSurface(NamedTuple):
 def _distance_around(
     lowered: TetDiscretization, points: Floats, values: Floats, positions: Floats, corners: Ints, owners: Ints
 ) -> tuple[Floats, Ints, int]:
-    """Return any-angle distances of points with a value, the nearest triangles, and how many points do not see them.
+    """Measure the any-angle distance of n unknowns to triangles, from whose zero set φ may deviate since it is curved.
 
-    A curved φ vanishes ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k) / |∇φ|`` away from the zero set of its linear interpolant.
+    Return (n,) distances, (n,) nearest triangles, or −1 without a value, and how many unknowns do not see them. The
+    unknowns have positions `points` and values of φ. Triangles have `positions` of vertices, (t, 3) `corners`, and
+    `owners`, the tets that they lie in, or −1. A curved φ vanishes ``½ Σ_k λ_k(x) ∇φ_k · (x − p_k) / |∇φ|`` away from
+    the zero set of its linear interpolant.
     """
     mesh, planes, unknowns = lowered.mesh, lowered.planes, lowered.unknowns
     tree = TriangleTree.of(positions[corners])
@@ -153,7 +157,7 @@ def _distance_around(
 
 
 def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
-    """Return (n + 1,) starts and a list of rows: those from ``starts[i]`` up to ``starts[i + 1]`` contain id i."""
+    """(n + 1,) starts, and a list of rows of (m, k) ids: those from ``starts[i]`` to ``starts[i + 1]`` contain id i."""
     starts, places = grouped(ids.ravel(), n)
     return starts, places // ids.shape[1]
 
@@ -162,9 +166,10 @@ def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
 def _any_angle(
     planes: Planes, vertices: Vertices, surface: SourceSurface, nearest: Ints, slack: float, queue: Queue
 ) -> tuple[Floats, Floats, int]:
-    """Return distances of vertices, where their paths start on the surface, and how many do not see the nearest place.
+    """(n,) distances of vertices from the surface, (n, 3) points where their paths start, and how many are hidden.
 
-    `nearest` (n,), the nearest triangles, in sight or not, or −1, is overwritten. Lines may be `slack` outside.
+    Hidden are vertices that do not see the nearest point. `nearest`, (n,), has the nearest triangles, in sight or not,
+    or −1; it is overwritten by those that paths start from. Lines may lie `slack` outside the mesh.
     """
     points, tets, _, first_tet, tets_at = vertices
     n = len(points)
@@ -227,7 +232,7 @@ def _any_angle(
 
 @compiled
 def _sees(planes: Planes, vertices: Vertices, v: int, target: Floats, slack: float) -> bool:
-    """Return whether the segment from vertex v to a target in the mesh lies in the mesh."""
+    """Whether the segment from vertex v to a (3,) target in the mesh lies in the mesh, up to `slack`."""
     x, y, z = vertices.points[v]
     u, w, t = target
     tet, least = -1, np.inf
@@ -245,7 +250,7 @@ def _sees(planes: Planes, vertices: Vertices, v: int, target: Floats, slack: flo
 
 @compiled
 def _nearest_around(surface: SourceSurface, triangle: int, x: float, y: float, z: float) -> tuple[int, Floats]:
-    """Return the triangle nearest to (x, y, z) of those that share a corner with a triangle, and its nearest point."""
+    """Return the triangle nearest to (x, y, z) of those that share a corner with a given one, and its nearest point."""
     least, closest, place = np.inf, triangle, np.zeros(3)
     for c in range(3):
         corner = surface.corners[triangle, c]
@@ -259,4 +264,5 @@ def _nearest_around(surface: SourceSurface, triangle: int, x: float, y: float, z
 
 @compiled
 def _length(point: Floats, x: float, y: float, z: float) -> float:
+    """Distance between two points."""
     return np.sqrt((point[0] - x) ** 2 + (point[1] - y) ** 2 + (point[2] - z) ** 2)

@@ -21,10 +21,10 @@ from .tet_mesh import TetMesh
 
 @dataclass(frozen=True, eq=False)
 class TetSource(Frozen):
-    """Sources on a tet mesh.
+    """Sources lowered to a tet mesh: what the signed heat method needs of them.
 
-    A patch belongs to one vertex and one component: the clipped polygons nearest to the vertex, and a third of each
-    face of the mesh at the vertex that the component covers.
+    φ is averaged over patches. A patch belongs to one vertex of the mesh and one component of the sources. It consists
+    of the clipped polygons nearest to the vertex, and of a third of each face at the vertex that the component covers.
     """
 
     vectors: Floats  # (f, 3) X₀ at the faces
@@ -32,20 +32,22 @@ class TetSource(Frozen):
     centers: Floats  # (p, 3) centroids of the clipped polygons
     time: float  # t of Eq. 12
     interpolation: sparse.csr_matrix  # (s, n) row i averages φ over patch i
-    # (s, 3n) maps the gradients of φ at the unknowns (x, y, z of each in turn) to the average of a quadratic φ minus
-    # that of its linear interpolant
+    # (s, 3n) maps gradients of φ at the unknowns (x, y, z of each in turn) to the difference, averaged over patches,
+    # between a quadratic φ and its linear interpolant
     quadratic_correction: sparse.csr_matrix
     weights: Floats  # (s,) area of each patch
-    # (s,) connected component, and source, that each patch belongs to
-    components: Ints
-    source_ids: Ints
+    components: Ints  # (s,) connected component that each patch belongs to
+    source_ids: Ints  # (s,) source that each patch belongs to
     notes: tuple[Note, ...]  # the parts of the sources that lie outside the mesh
 
 
 def tet_source(
     mesh: TetMesh, planes: Planes, unknowns: Ints, sources: Sequence[Any], diffusion: float, spacing: float
 ) -> TetSource:
-    """Clip sources against a tet mesh, with `unknowns` (m, 4) of φ; ``t = diffusion · max(spacing, h_source)²``."""
+    """Clip sources against a tet mesh, and lower them; ``t = diffusion · max(spacing, h_source)²``.
+
+    `unknowns` are the (m, 4) unknowns of φ at the corners of tets.
+    """
     cuts, components, outside, n_components, n_unknowns = [], [], np.zeros(len(sources)), 0, int(unknowns.max()) + 1
     for number, source in enumerate(sources):
         elements = area_elements(source)
@@ -94,7 +96,7 @@ def tet_source(
 
 
 def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygons:
-    """Clip the triangles of a source against the tets, or find the tets that contain its points."""
+    """Clip the triangles of a source against the tets, or find the tets that contain its points if it has no faces."""
     if elements.corners.shape[1] == 3:
         polygons = clip_triangles(mesh.geometry, planes, elements.corners)
         sizes = np.linalg.norm(elements.vectors, axis=1)
@@ -107,11 +109,11 @@ def _cut(mesh: TetMesh, planes: Planes, elements: AreaElements) -> ClippedPolygo
 
 
 def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
-    """Return (f, 4) X₀ at the faces (Sec. 8.1), and in the last column the scalar source.
+    """(f, 4) X₀ at the faces (Sec. 8.1) in three columns, and the scalar source in the last; `width` is √t.
 
-    A polygon is shared by the faces of its tet as ψ = 1 − 3λ, if positive: negative shares emit waves of wrong sign.
-    A plane wave decays by e^(−r/√t), so a face δ √t ahead emits e^δ times too much forward, e^−δ backward; weights that
-    are a mean of e^−δ and e^δ correct both.
+    A polygon is shared out to the faces of its tet by ψ = 1 − 3λ, where that is positive, since negative shares emit
+    waves of the wrong sign. A plane wave decays by e^(−r/√t), so a face δ √t ahead of the polygon emits e^δ times too
+    much forward, and e^−δ times backward. Weights that are a mean of e^−δ and e^δ correct both.
     """
     shares = np.maximum(1 - 3 * polygons.barycentric, 0)
     corners = mesh.vertices[mesh.tets[polygons.tets]]
@@ -130,9 +132,11 @@ def _loads(mesh: TetMesh, polygons: ClippedPolygons, width: float) -> Floats:
 def _patches(
     mesh: TetMesh, unknowns: Ints, n_unknowns: int, polygons: ClippedPolygons, components: Ints
 ) -> tuple[sparse.csr_matrix, sparse.csr_matrix, Floats, Ints]:
-    """Return interpolation rows, quadratic corrections, areas and components of the patches.
+    """Group the polygons of one source to s patches, see `TetSource`.
 
-    Linear functions cannot satisfy a row per polygon. A quadratic φ at x is ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
+    Return (s, n) interpolation rows, (s, 3n) quadratic corrections, (s,) areas and (s,) components. There is no row for
+    each polygon, since functions that are linear in tets could not satisfy them. A quadratic φ at x is
+    ``Σ λᵢ (φ(vᵢ) + ½ ∇φ(vᵢ)·(x − vᵢ))``.
     """
     corners = unknowns[polygons.tets]
     conforming = _on_whole_faces(mesh, polygons, components)
@@ -158,17 +162,18 @@ def _patches(
     rows.eliminate_zeros()
     away = (_centers(mesh, polygons)[:, None] - mesh.vertices[mesh.tets[polygons.tets]])[inside].reshape(-1, 3)
     steps = (entries / np.where(real, weights, 1)[index])[n_on:, None] * away / 2
-    places = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
-    corrections = sparse.csr_matrix((steps.ravel(), places), shape=(len(patch_keys), 3 * n_unknowns))
+    rows_and_columns = np.repeat(index[n_on:], 3), (3 * columns[n_on:, None] + np.arange(3)).ravel()
+    corrections = sparse.csr_matrix((steps.ravel(), rows_and_columns), shape=(len(patch_keys), 3 * n_unknowns))
     return rows[real], corrections[real], weights[real], patch_keys[real] // n_unknowns
 
 
 def _centers(mesh: TetMesh, polygons: ClippedPolygons) -> Floats:
+    """(p, 3) centroids of the polygons."""
     return np.einsum("pk,pki->pi", polygons.barycentric, mesh.vertices[mesh.tets[polygons.tets]])
 
 
 def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: Ints) -> Bools:
-    """Return (p,) whether each polygon lies in a face of the mesh that its component covers entirely."""
+    """(p,) whether each polygon lies in a face of the mesh that its component, (p,), covers entirely."""
     on = polygons.in_face >= 0
     covered = np.zeros(len(on), dtype=bool)
     if on.any():
@@ -181,4 +186,5 @@ def _on_whole_faces(mesh: TetMesh, polygons: ClippedPolygons, components: Ints) 
 
 
 def _box(mesh: TetMesh) -> str:
+    """Return the box around a mesh as text, an interval for each axis."""
     return " × ".join(f"[{a:.4g}, {b:.4g}]" for a, b in mesh.bounds.T)
