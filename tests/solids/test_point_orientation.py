@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.solids.gauss import Pieces, system_of
+from signedheat.solids.gauss import Pieces, system_of, without_slender
 from signedheat.solids.point_orientation import orient_points
 from signedheat.surfaces.normal_orientation import outward_normals
 
@@ -196,6 +196,27 @@ def test_triangles_without_area_keep_their_order():
     corners = np.concatenate([samples.sphere(2).vertices[samples.sphere(2).faces], np.zeros((2, 3, 3))])
     np.testing.assert_array_equal(orient_triangles(corners), np.ones(len(corners)))
     np.testing.assert_array_equal(orient_triangles(np.zeros((5, 3, 3))), np.ones(5))
+
+
+@pytest.mark.parametrize("move", [0.0, 1e3])
+def test_only_slender_triangles_with_an_area_are_halved(move):
+    """Ten thousand triangles of one line took half a minute: each became 64 dipoles."""
+    random = np.random.default_rng(0)
+    collinear = random.random((300, 3, 1)) * [1.0, 2.0, 3.0] + move
+    strip = np.array([[[0.0, 0.0, 0.0], [100.0, 0.0, 0.0], [100.0, 1.0, 0.0]]]) + move
+    pieces = without_slender(Pieces(np.concatenate([collinear, strip]), np.arange(301)))
+    assert (np.bincount(pieces.labels)[:300] == 1).all()
+    assert np.bincount(pieces.labels)[300] >= 16
+
+
+def test_a_system_of_some_pieces_is_near_that_made_of_them_alone():
+    corners = samples.soup(samples.torus(), 0.002).vertices.reshape(-1, 3, 3)
+    kept = np.random.default_rng(1).random(len(corners)) < 0.9
+    none = np.zeros(kept.sum(), dtype=bool)
+    restricted = system_of(Pieces(corners, np.arange(len(corners)))).chosen(kept).weights(none)
+    alone = system_of(Pieces(corners[kept], np.arange(kept.sum()))).weights(none)
+    assert (restricted > 0).all()
+    assert np.abs(restricted - alone).mean() < 0.1
 
 
 def test_distance_to_points_without_normals_is_that_with_them():

@@ -31,7 +31,7 @@ from ..linear.conjugate_gradients import conjugate_gradients
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
 from ..mesh.components import first_members, numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas, halved, side_lengths
-from ..mesh.unit_vectors import unit
+from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
 from ..parallel import PointTree, in_chunks
 from ..search.winding_tree import WindingTree, mean_angle
 from ..surfaces.plane_fits import point_spacing
@@ -169,7 +169,7 @@ class Matrix:
         sums = sparse.csr_array((np.ones(k), (np.arange(k), unknowns)))
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
-        normal += agreement(self.places, self.normals, shares, self.owners).toarray()
+        normal += agreement(links_of(self.places, self.normals, self.owners), shares, self.owners).toarray()
         damping = np.bincount(self.owners, shares, k)
         normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(damping, LEAST_AREA_SHARE)
         right_side = weighted.T @ (0.5 + self.within)
@@ -190,10 +190,14 @@ class Matrix:
 
 
 def without_slender(pieces: Pieces) -> Pieces:
-    """Halve slender triangles, up to six times and as long as there are at most `MOST_DIPOLES`."""
+    """Halve slender triangles, up to six times and as long as there are at most `MOST_DIPOLES`.
+
+    Triangles without area, up to rounding, are left as they are: their halves are as slender.
+    """
     triangles, labels = pieces.triangles, pieces.labels
     for _ in range(6):
-        slender = side_lengths(triangles).max(axis=1) ** 2 > SLENDER_TRIANGLE * face_areas(triangles)
+        squares, areas = side_lengths(triangles).max(axis=1) ** 2, face_areas(triangles)
+        slender = (squares > SLENDER_TRIANGLE * areas) & (areas > ANGLE_ROUNDING * squares)
         if not slender.any() or len(triangles) + slender.sum() > MOST_DIPOLES:
             break
         triangles = np.concatenate([triangles[~slender], halved(triangles[slender])])
@@ -261,6 +265,19 @@ def _small_pieces(
             matrix[p, piece] = angle / (4.0 * np.pi)
 
 
+class Links(NamedTuple):
+    """Pairs of neighbouring samples on different pieces, and how strongly each pair asks for agreement."""
+
+    tails: Ints  # (p,) samples
+    heads: Ints  # (p,) samples
+    strength: Floats  # (p,) from −1 to 1, negative where the normals point apart
+
+    def chosen(self, rows: Bools) -> Links:
+        """Restrict the pairs to some of the (n,) samples, which are renumbered."""
+        numbers, kept = np.cumsum(rows) - 1, rows[self.tails] & rows[self.heads]
+        return Links(numbers[self.tails[kept]], numbers[self.heads[kept]], self.strength[kept])
+
+
 class Walk(NamedTuple):
     """A tree of dipoles, and the nodes by which their field is summed for each group of neighbouring dipoles."""
 
@@ -284,6 +301,7 @@ class Dipoles:
     owners: Ints  # (n,) piece that each dipole is part of
     softening: Floats  # (n,) distance below which the field of a dipole levels off
     within: Floats  # (n,) winding numbers of the bodies that are ignored at each dipole
+    links: Links  # neighbours among all dipoles that were made: to find them again takes longer than to solve
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
@@ -296,8 +314,8 @@ class Dipoles:
             areas = areas * (pieces.areas / np.maximum(kept, np.finfo(float).tiny))[pieces.labels]
         triangles = pieces.triangles[faces]
         places = triangles.mean(axis=1)
-        normals, none = unit(area_vectors(triangles)), np.zeros(len(faces))
-        return cls(places, normals, areas[faces], pieces.labels[faces], spacing(places), none)
+        normals, owners, none = unit(area_vectors(triangles)), pieces.labels[faces], np.zeros(len(faces))
+        return cls(places, normals, areas[faces], owners, spacing(places), none, links_of(places, normals, owners))
 
     @cached_property
     def tree(self) -> BoxTree:
@@ -319,7 +337,7 @@ class Dipoles:
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         values = (self.places, self.normals, self.areas, self.softening, self.within)
         places, normals, areas, softening, within = (array[rows] for array in values)
-        return Dipoles(places, normals, areas, owners, softening, within)
+        return Dipoles(places, normals, areas, owners, softening, within, self.links.chosen(rows))
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
         """(k,) least-squares weights by conjugate gradients, from `start` or from zero.
@@ -327,7 +345,7 @@ class Dipoles:
         Their signs orient the pieces; the (k,) `fixed` ones get the same weight ≥ 0.
         """
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
-        laplacian, unknowns = agreement(self.places, self.normals, shares, self.owners), together(fixed)
+        laplacian, unknowns = agreement(self.links, shares, self.owners), together(fixed)
         n = int(unknowns.max()) + 1
         damping = WEIGHT_DAMPING * np.bincount(self.owners, shares)
 
@@ -392,12 +410,8 @@ class Dipoles:
         return sums
 
 
-def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> sparse.csr_array:
-    """(k, k) matrix of the second term of E: a signed graph Laplacian of the pieces, times μ.
-
-    Pieces are linked where neighbouring samples lie roughly in one plane; the link is weaker the more samples they
-    have. All but the result are (n,) per sample, `shares` its part of the whole area.
-    """
+def links_of(places: Floats, normals: Floats, owners: Ints) -> Links:
+    """Link (n, 3) samples with neighbours on other pieces that lie roughly in one plane with them."""
     n, k = len(places), min(PLANE_NEIGHBORS, len(places) - 1)
     near = PointTree(places).query(places, k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
@@ -406,16 +420,24 @@ def agreement(places: Floats, normals: Floats, shares: Floats, owners: Ints) -> 
     ways = unit(places[heads] - places[tails])
     cosines = (normals[tails] * normals[heads]).sum(axis=1)
     rises = [np.abs((ways * normals[ends]).sum(axis=1)) for ends in (tails, heads)]
-    strength = np.maximum(0.0, 1.0 - 2.0 * np.maximum(*rises)) * cosines * np.abs(cosines)
+    return Links(tails, heads, np.maximum(0.0, 1.0 - 2.0 * np.maximum(*rises)) * cosines * np.abs(cosines))
+
+
+def agreement(links: Links, shares: Floats, owners: Ints) -> sparse.csr_array:
+    """(k, k) matrix of the second term of E: a signed graph Laplacian of the pieces, times μ.
+
+    A link is weaker the more samples its pieces have. `shares` are the (n,) parts of the whole area of the samples.
+    """
+    (tails, heads, strength), n = links, len(owners)
     total = np.bincount(tails, np.abs(strength), n) + np.bincount(heads, np.abs(strength), n)
     scale = np.sqrt(shares / np.maximum(total, 1e-12))
     counts = np.bincount(owners)[owners]  # places of two large pieces may be farther apart than the pieces are
-    strength *= PLANE_AGREEMENT * scale[tails] * scale[heads] / np.minimum(counts[tails], counts[heads])
+    weights = strength * PLANE_AGREEMENT * scale[tails] * scale[heads] / np.minimum(counts[tails], counts[heads])
     size = int(owners.max()) + 1
-    links = sparse.coo_array((strength, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
-    links = links + links.T
-    held = np.asarray(abs(links).sum(axis=1), dtype=np.float64).ravel()
-    return (sparse.diags_array(held) - links).tocsr()
+    sums = sparse.coo_array((weights, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
+    sums = sums + sums.T
+    held = np.asarray(abs(sums).sum(axis=1), dtype=np.float64).ravel()
+    return (sparse.diags_array(held) - sums).tocsr()
 
 
 def spacing(points: Floats) -> Floats:
