@@ -166,8 +166,12 @@ class IntrinsicMesh(Frozen):
         This is three times the mean of Sec. 6.
         """
         straight, mirrored = self._face_sums
-        sums: Complexes = straight @ vectors
-        return sums + mirrored @ np.conj(vectors) if mirrored.nnz else sums
+        sums = np.empty((self.n_faces, vectors.shape[1]), dtype=np.complex128, order="F")
+        for k, column in enumerate(vectors.T):
+            sums[:, k] = straight @ column
+            if mirrored.nnz:
+                sums[:, k] += mirrored @ np.conj(column)
+        return sums
 
     @cached_property
     def _face_sums(self) -> tuple[sparse.csr_array, sparse.csr_array]:

@@ -58,7 +58,8 @@ class VectorHeat:
         The columns of a stage are X, R X, R² X, …, with ``R = (M + tL)⁻¹ M``. Each later stage has values, with a scale
         of their own, only at edges where the one before has underflowed, and NaN elsewhere.
         """
-        starts = np.zeros((self.triangles.n_edges, len(sources), 1 + changes), dtype=np.complex128)
+        shape = self.triangles.n_edges, len(sources), 1 + changes
+        starts = np.zeros(shape, dtype=np.complex128, order="F")  # each column is solved for, and read, at once
         for k, source in enumerate(sources):
             starts[source.indices, k, 0] = scaled(source.data, float(self.mass.min()))[0]
         together = self._solve(starts)
@@ -109,12 +110,17 @@ def extrapolated(columns: Complexes) -> Complexes:
     ``D X = R X − X`` and ``D² X = X − 3 R X + 2 R² X``; those of Y follow from the angle θ of X = exp(ρ + iθ).
     """
     x, once, twice = columns.T
+    linear, quadratic = -sum(1.0 / e for e in TIME_EXPONENTS), 1.0 / float(np.prod(TIME_EXPONENTS))
+    factor = np.empty(x.shape, dtype=np.complex128)
     with np.errstate(all="ignore"):
-        first, second = once / x - 1.0, 1.0 - 3.0 * (once / x) + 2.0 * (twice / x)
-        turn, bend = first.imag, (second - first**2).imag
-        linear, quadratic = -sum(1.0 / e for e in TIME_EXPONENTS), 1.0 / float(np.prod(TIME_EXPONENTS))
-        factor = 1.0 + 1j * linear * turn + quadratic * (1j * bend - turn**2)
-    return unit(x.copy()) * np.where(np.isfinite(factor), factor, 1.0)
+        change, changes = once / x, twice / x
+        turn = change.imag
+        # the imaginary part of 1 − 3 R X / X + 2 R² X / X − (R X / X − 1)²
+        bend = 2.0 * changes.imag - 3.0 * turn - 2.0 * (change.real - 1.0) * turn
+        factor.real = 1.0 - quadratic * turn**2
+        factor.imag = linear * turn + quadratic * bend
+    factor[~np.isfinite(factor)] = 1.0
+    return unit(x) * factor
 
 
 def vector_heat_matrix(triangles: IntrinsicMesh, time: float) -> sparse.csr_matrix:
