@@ -1,4 +1,4 @@
-"""What reading one file may take: bytes of memory, elements and points that it makes of others, processor time.
+"""Limits on what reading one file may use: memory, elements and points that it repeats, and processor time.
 
 A file of some kilobytes can stand for any number of points: parts that name other parts, arrays that are packed or used
 again. Therefore each reader charges what it is about to make to the account of the file, which is refused before the
@@ -23,20 +23,20 @@ from ..validation import positive_number, whole_number
 LEAST_SECONDS, BYTES_PER_SECOND = 10.0, 20_000
 """Processor time for any file in seconds, and the bytes of a file that add another second."""
 MOST_ELEMENTS, MOST_POINTS = 10**5, 2 * 10**7
-"""Elements and points that a file may make by naming parts of itself again; each of its bytes adds one to both."""
+"""Elements and points that a file may make by naming parts of itself again. Each of its bytes adds one to both."""
 BYTES_PER_PLACED = 70
-"""Memory for a point or a face that is placed and joined to a mesh: measured."""
+"""Memory for each point or face of a body that is transformed and joined to a mesh, as measured."""
 BYTES_PER_WORD, BYTES_PER_LINE = 58, 120
 """Memory for a word of a text, and for the list of the words of a line."""
 XML, JSON = "<=", "[{,:"
-"""Characters of which there is one in each tag and attribute, or in each list and item."""
+"""Characters that count the nodes of a tree: one for each tag and attribute, or for each list and item."""
 BYTES_PER_NODE = 100
 """Memory for an element or an attribute of XML, and for a list or a dictionary of JSON."""
 
 
 @dataclass(frozen=True)
 class Budget:
-    """What each file may take that is read within a ``with`` block.
+    """Limit the memory and time that reading each file within a ``with`` block may use.
 
     A server that reads files of strangers sets what one of them may cost. Files that exceed it are refused by an error
     that names them, before the memory is allocated.
@@ -44,14 +44,15 @@ class Budget:
     Parameters
     ----------
     bytes : float, optional
-        Memory while a file is read; by default what is free.
+        Largest memory in bytes while a file is read, by default the free memory.
     elements : int, optional
-        Elements that may be named again and again: components, instances, pieces, ``<use>`` in a drawing; by default
-        100,000, and one for every byte of the file.
+        Largest number of elements that a file can repeat by naming them again, such as components, instances and
+        ``<use>`` in a drawing. The default is 100,000 and one for every byte of the file.
     points : int, optional
-        Points and faces of these elements; by default 20 million, and one for every byte of the file.
+        Largest number of points and faces of these elements. The default is 20 million and one for every byte of the
+        file.
     seconds : float, optional
-        Processor time; by default 10 seconds, and one more for every 20,000 bytes of the file.
+        Largest processor time in seconds. The default is 10 and one more for every 20,000 bytes of the file.
 
     Raises
     ------
@@ -101,20 +102,20 @@ _budgets: ContextVar[tuple[Budget, ...]] = ContextVar("budgets", default=())
 
 @dataclass
 class _Account:
-    """What is left of the budget of a file."""
+    """What reading a file has used so far, and its limits."""
 
     path: str | os.PathLike[str]
-    size: int
+    size: int  # bytes of the file and of those that it names
     budget: Budget
-    free: float
-    files: set[str | os.PathLike[str]]
-    bytes: float = 0.0
+    free: float  # largest memory in bytes: what was free at the beginning, or what the budget allows if that is less
+    files: set[str | os.PathLike[str]]  # files whose size is counted
+    bytes: float = 0.0  # memory, elements and points that have been charged
     elements: int = 0
     points: int = 0
-    begin: float = 0.0
+    begin: float = 0.0  # processor time of the thread at the beginning, in seconds
 
     def seconds(self, least: float) -> float:
-        """Return the processor time that the file may take in all."""
+        """Return the largest processor time in seconds; by default `least` and more for large files."""
         given = self.budget.seconds
         return least + self.size / BYTES_PER_SECOND if given is None else given
 
@@ -124,7 +125,7 @@ _open: ContextVar[_Account | None] = ContextVar("account", default=None)
 
 @contextmanager
 def account(path: str | os.PathLike[str]) -> Iterator[_Account]:
-    """Open the account of a file; files that it names are charged to the same account."""
+    """Open the account of a file, or within that of another file, which names this one, continue that account."""
     current = _open.get()
     try:
         size = os.stat(path).st_size
@@ -148,7 +149,7 @@ def account(path: str | os.PathLike[str]) -> Iterator[_Account]:
 
 
 def charge(bytes: float = 0, elements: int = 0, points: int = 0) -> None:
-    """Charge what is about to be made to the account of the file that is read; refuse it if that exceeds the budget."""
+    """Add to what reading the current file has used; raise an error if that exceeds the budget of the file."""
     current = _open.get()
     if current is None:
         return
@@ -183,23 +184,26 @@ def charge(bytes: float = 0, elements: int = 0, points: int = 0) -> None:
 
 
 def charge_words(content: str | bytes) -> None:
-    """Charge the words and lines into which a text is about to be split."""
+    """Charge the memory of the lists of words and lines into which a text is about to be split."""
     count = _counter(content)
     lines = 1 + count("\n")
     charge(bytes=BYTES_PER_WORD * (lines + sum(map(count, " ,\t"))) + BYTES_PER_LINE * lines)
 
 
 def charge_tree(content: str | bytes, marks: str) -> None:
-    """Charge the tree into which a text is about to be parsed; each node has one of the marks of `XML` or `JSON`."""
+    """Charge the memory of the tree into which a text is about to be parsed; `marks` are `XML` or `JSON`."""
     charge(bytes=len(content) + BYTES_PER_NODE * sum(map(_counter(content), marks)))
 
 
 def _counter(content: str | bytes) -> Callable[[str], int]:
-    """Return the function that counts a character in a text."""
+    """Return a function that counts how often a character occurs in a text."""
     return content.count if isinstance(content, str) else lambda character: content.count(character.encode())
 
 
 def left(path: str | os.PathLike[str], least_seconds: float) -> tuple[float, int]:
-    """Return the bytes that are left for a file, and the whole seconds that a parser of another package may take."""
+    """Return the memory in bytes that is left for a file, and the seconds that a parser of another package may take.
+
+    `least_seconds` is the processor time for any file, to which some is added for large ones.
+    """
     with account(path) as current:
         return current.free - current.bytes, max(int(current.seconds(least_seconds)), 1)

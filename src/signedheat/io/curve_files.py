@@ -29,10 +29,11 @@ from .numerals import integer, integers
 from .point_files import read_point_lists
 
 GROUP_KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
+"""Kinds of groups in a file: curves with an inside (`oriented`), curves without, and points."""
 
 
 class Node(NamedTuple):
-    """A point in a file, given by up to three vertices and their weights."""
+    """A point in a file: the weighted mean of one vertex, two of an edge, or three of a face."""
 
     vertices: tuple[int, ...]
     weights: tuple[float, ...]
@@ -41,7 +42,7 @@ class Node(NamedTuple):
 class Group(NamedTuple):
     """A curve in a file, or several points."""
 
-    kind: str
+    kind: str  # one of `GROUP_KINDS`
     nodes: list[Node]
 
 
@@ -168,7 +169,7 @@ def surface_in_space(domain: EmbeddedSurface | ForeignShape) -> EmbeddedSurface:
 
 
 def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
-    """Place the curve or the points of a group on the surface."""
+    """Convert a group to a curve on the surface, which is closed if it ends where it begins, or to points."""
     faces, weights = on_faces(group.nodes, domain)
     if group.kind == POINTS:
         return SurfacePoints(faces, weights)
@@ -178,7 +179,7 @@ def placed(group: Group, domain: EmbeddedSurface) -> CurveOrPoints:
 
 
 def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floats]:
-    """Return faces, (n,), on which the nodes lie, and their barycentric coordinates in these, (n, 3)."""
+    """Return (n,) faces on which n nodes lie, and (n, 3) barycentric coordinates of the nodes in these faces."""
     mesh = domain.triangulation
     count = np.array([len(node.vertices) for node in nodes])
     faces, weights = np.zeros(len(nodes), dtype=np.int64), np.zeros((len(nodes), 3))
@@ -208,7 +209,7 @@ def on_faces(nodes: Sequence[Node], domain: EmbeddedSurface) -> tuple[Ints, Floa
 
 
 def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple[int, int]]) -> list[Group]:
-    """Join segments, which are pairs of indices of nodes, to curves; equal nodes count as one."""
+    """Join segments, which are pairs of indices of nodes, to curves of a kind. Equal nodes count as the same point."""
     bad = [s for s in segments if not all(0 <= i < len(nodes) for i in s)]
     if bad:
         raise FileFormatError(
@@ -316,7 +317,7 @@ def nodes_of(faces: Ints, weights: Floats, domain: EmbeddedSurface) -> list[Node
 
 
 def _groups_to_write(curves: Sequence[CurveOrPoints], domain: EmbeddedSurface) -> list[Group]:
-    """Express curves and points as groups of a file; closed curves end with their first point."""
+    """Convert curves and points to the groups that a file holds. Closed curves end with their first point."""
     groups = []
     for number, curve in enumerate(curves):
         if not isinstance(curve, (Curve, SurfacePoints)):

@@ -28,8 +28,11 @@ from .sandbox import parsed
 CURVE_PIECES = 64
 """Number of segments that approximate a Bézier curve or an arc."""
 NUMBER = re.compile(r"[\s,]*([-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)")
+"""Matches a number after spaces and commas."""
 FLAG = re.compile(r"[\s,]*([01])")
+"""Matches a flag of an arc, which is one digit that needs no space after it."""
 COMMAND = re.compile(r"[\s,]*([MmZzLlHhVvCcSsQqTtAa])")
+"""Matches the letter of a command of a path."""
 ARGUMENTS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 """Number of arguments of each command of a path."""
 SVG_UNITS = {"": 1.0, "px": 1.0, "pt": 4 / 3, "pc": 16.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "q": 96 / 101.6, "in": 96.0}
@@ -38,8 +41,9 @@ SVG_UNITS |= {"em": 16.0, "ex": 8.0}
 MOST_DEPTH = 100
 """Largest depth of nested elements of a drawing."""
 CONTAINERS = ("svg", "g", "a", "switch")
+"""Names of elements whose children are drawn."""
 PLACED = {"svg": ("viewBox", "x", "y"), "symbol": ("viewBox",)}
-"""Attributes that give a drawing within a drawing coordinates of its own, by the name of its element."""
+"""Attributes by which an element within a drawing has coordinates of its own, which are refused, by its name."""
 AXES = {"x": 0, "x1": 0, "x2": 0, "cx": 0, "rx": 0, "width": 0, "y": 1, "y1": 1, "y2": 1, "cy": 1, "ry": 1, "height": 1}
 """Axis, 0 or 1, of each attribute that is a length along x or y."""
 BYTES_PER_CURVE_POINT = 64
@@ -47,7 +51,7 @@ BYTES_PER_CURVE_POINT = 64
 
 
 def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
-    """Read the points of each subpath, in drawing order with y upwards, and whether it is closed."""
+    """Return the (n, 2) points of each subpath, with y upwards, and whether it is closed, in the order of drawing."""
     data = contents(path)
     charge_tree(data, XML)
     try:
@@ -65,17 +69,32 @@ def read_svg(path: PathLike) -> list[tuple[Floats, bool]]:
 
 @dataclass
 class _Drawing:
-    """Elements of a drawing by id, and its size in user units."""
+    """Converts the elements of a drawing to polylines."""
 
-    named: dict[str, ElementTree.Element]
-    size: tuple[float, float]
-    counts: dict[ElementTree.Element, int] = field(default_factory=dict)
+    named: dict[str, ElementTree.Element]  # elements by id
+    size: tuple[float, float]  # width and height in user units, NaN where the drawing does not give them
+    counts: dict[ElementTree.Element, int] = field(default_factory=dict)  # results of `n_used`
     parts: dict[tuple[ElementTree.Element, str], list[tuple[Floats, bool]]] = field(default_factory=dict)
+    """Subpaths of elements by element and fill rule, before any transform."""
 
     def drawn(
         self, element: ElementTree.Element, outer: Floats, depth: int = 0, is_used: bool = False, rule: str = "nonzero"
     ) -> Iterator[list[tuple[Floats, bool]]]:
-        """Yield the subpaths of an element and its children; with the evenodd rule, outlines of what they fill."""
+        """Yield the subpaths of an element and of its children as lists of (n, 2) points and whether they are closed.
+
+        Parameters
+        ----------
+        element : Element
+            The element.
+        outer : (3, 3) float
+            The transform from its parent to the drawing, which maps the result.
+        depth : int
+            How many elements contain it.
+        is_used : bool
+            Whether a ``<use>`` draws it, so that its points count as repeated in the budget of the file.
+        rule : str
+            The fill rule of its parent. With ``"evenodd"``, outlines of what closed subpaths fill replace them.
+        """
         if depth > MOST_DEPTH:
             raise damaged(f"its elements lie more than {MOST_DEPTH} levels deep, or contain themselves")
         kind = _kind(element)
@@ -104,22 +123,22 @@ class _Drawing:
             yield [(points @ matrix[:2, :2].T + matrix[:2, 2], closed) for points, closed in parts]
 
     def n_used(self, element: ElementTree.Element, depth: int = 0) -> int:
-        """Count what is drawn where an element is used: itself, what is in it, and what these use."""
+        """Return the number of elements that drawing this one draws: itself, its children, and what these use."""
         if element not in self.counts:
             if depth > MOST_DEPTH:
                 raise damaged(f"its elements lie more than {MOST_DEPTH} levels deep, or contain themselves")
             target = self._target(element) if _kind(element) == "use" else None
             inner = [*element, *([] if target is None else [target])]
-            self.counts[element] = 1 + sum(self.n_used(each, depth + 1) for each in inner)
+            self.counts[element] = 1 + sum(self.n_used(child, depth + 1) for child in inner)
         return self.counts[element]
 
     def _target(self, element: ElementTree.Element) -> ElementTree.Element | None:
-        """Return what a ``<use>`` names."""
+        """Return the element that a ``<use>`` names, or None if it does not exist."""
         name = next((value for key, value in element.attrib.items() if key.rpartition("}")[2] == "href"), "")
         return self.named.get(name[1:])
 
     def _parts(self, data: str, rule: str) -> list[tuple[Floats, bool]]:
-        """Return the subpaths of path data, or with the evenodd rule the outlines of what they fill."""
+        """Return the subpaths of path data. With the evenodd rule, outlines of what they fill replace closed ones."""
         parts = list(_subpaths(data))
         if rule != "evenodd" or not any(closed for _, closed in parts):
             return parts
@@ -127,7 +146,10 @@ class _Drawing:
         return [*((outline[::-1], True) for outline in filled), *(part for part in parts if not part[1])]
 
     def _path(self, element: ElementTree.Element, kind: str) -> str:
-        """Return the path data of an element; circles and ellipses run clockwise in the drawing."""
+        """Return the path data of an element of a given kind, such as ``circle``; empty if it draws no line.
+
+        Circles, ellipses and rectangles run clockwise in the drawing.
+        """
         if kind == "path":
             return element.get("d", "")
         if kind == "line":
@@ -160,7 +182,7 @@ class _Drawing:
 
 
 def _uses(root: ElementTree.Element) -> Iterator[ElementTree.Element]:
-    """Return what uses others in a drawing, without what is only defined in it."""
+    """Yield the ``<use>`` elements that are drawn themselves, not those within definitions."""
     waiting = [root]
     while waiting:
         element = waiting.pop()
@@ -224,7 +246,7 @@ def _size(root: ElementTree.Element) -> tuple[float, float]:
 
 
 def _transform(text: str) -> Floats:
-    """Return the product of a list of transforms in an attribute, as a (3, 3) matrix."""
+    """Return the (3, 3) product of the transforms listed in an attribute; columns of points are multiplied by it."""
     matrix = np.eye(3)
     *steps, rest = text.split(")")
     for written in (*steps, *([rest] if rest.strip() else [])):
@@ -261,8 +283,8 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
         elif command in "Zz":  # also true at the beginning, where it is empty
             raise damaged(f"a path goes on with '{data[position : position + 20].strip()}', which is not a command")
         numbers = []
-        for place in range(ARGUMENTS[command.upper()]):
-            pattern = FLAG if command in "Aa" and place in (3, 4) else NUMBER  # flags of arcs need no space after them
+        for index in range(ARGUMENTS[command.upper()]):
+            pattern = FLAG if command in "Aa" and index in (3, 4) else NUMBER  # flags of arcs need no space after them
             number = pattern.match(data, position)
             if number is None:
                 raise damaged(
@@ -275,7 +297,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
 
 
 def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
-    """Yield the points of each subpath that has a length, and whether it is closed."""
+    """Yield the (n, 2) points of each subpath of path data that has a length, and whether it is closed."""
     points: list[Complexes] = []
     place = start = control = 0j
     before, closed = "", False
@@ -311,7 +333,10 @@ def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
 
 
 def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]]:
-    """Yield a subpath if it has a length; it is closed also if it ends where it begins, up to rounding."""
+    """Yield the subpath joined from parts, with (n, 2) points, unless it has no length; and whether it is closed.
+
+    It is also closed if it ends where it begins, up to rounding.
+    """
     points = np.concatenate([np.zeros(0, dtype=np.complex128), *parts])
     if len(points) == 0 or (points == points[0]).all():
         return
@@ -322,7 +347,10 @@ def _whole(parts: list[Complexes], closed: bool) -> Iterator[tuple[Floats, bool]
 
 
 def _bezier(corners: list[complex]) -> Complexes:
-    """Return points of a Bézier curve of any degree, by de Casteljau's algorithm; the first one is left out."""
+    """Return points of a Bézier curve of any degree without its first, by de Casteljau's algorithm.
+
+    Points are complex numbers; `corners` are the control points.
+    """
     t = np.arange(1, CURVE_PIECES + 1) / CURVE_PIECES
     rows = [np.full(CURVE_PIECES, corner) for corner in corners]
     while len(rows) > 1:
@@ -334,7 +362,10 @@ def _bezier(corners: list[complex]) -> Complexes:
 def _arc(
     begin: complex, end: complex, rx: float, ry: float, degrees: float, is_large: float, is_clockwise: float
 ) -> Complexes:
-    """Return points of an elliptical arc but the first, by a map of the ellipse to a circle (SVG 1.1, F.6.5)."""
+    """Return points of an elliptical arc without its first, by a map of the ellipse to a circle (SVG 1.1, F.6.5).
+
+    Points are complex numbers; the other arguments are those of the command ``A``.
+    """
     rx, ry = abs(rx), abs(ry)
     if rx * ry == 0 or begin == end:
         return np.array([end])
@@ -383,19 +414,23 @@ def read_polylines(path: PathLike) -> list[Polyline]:
     Parameters
     ----------
     path : str or path
-        ``.svg``: all paths, lines, polylines, polygons, rectangles, circles and ellipses, with their transforms, in
-        user units, 96 of which are an inch. The y axis, which points down in such files, is flipped, so that the left
-        of a path is its left in the drawing. Subpaths without length are left out. Where a file says ``fill-rule:
-        evenodd``, closed subpaths become the outlines of what they fill. ``.csv``: x and y on each line, an empty line
-        between polylines. A polyline is closed if its last point equals its first. ``.geojson``: lines, and the
-        rings of polygons, in the plane of their coordinates. ``.dxf``, by the package ezdxf: lines, polylines, arcs,
-        circles, ellipses, splines and hatches, those of blocks where these are inserted, seen along z. What closes
-        becomes the outlines of what lies within an odd number of them.
+        A file in one of these formats:
+
+        - SVG (``.svg``) has paths, lines, polylines, polygons, rectangles, circles and ellipses. They are transformed
+          as the file says, to user units, 96 of which are an inch. The y axis, which points down in such files, is
+          flipped, so that the left of a path is its left in the drawing. Subpaths without length are left out. Where a
+          file says ``fill-rule: evenodd``, closed subpaths become the outlines of what they fill.
+        - CSV (``.csv``) has x and y on each line, and an empty line between polylines. A polyline is closed if its last
+          point equals its first.
+        - GeoJSON (``.geojson``) has lines, and the rings of polygons, in the plane of their coordinates.
+        - DXF (``.dxf``), read by the package ezdxf, has lines, polylines, arcs, circles, ellipses, splines and hatches,
+          also in inserted blocks. They are seen along z. Closed lines become the outlines of what lies within an odd
+          number of them.
 
     Returns
     -------
     list of Polyline
-        In the order of the file.
+        The polylines in the order of the file.
 
     Raises
     ------
@@ -440,8 +475,8 @@ def write_polylines(lines: Polyline | Sequence[Polyline], path: PathLike) -> Non
     lines : Polyline or sequence of Polyline
         The polylines.
     path : str or path
-        ``.svg`` or ``.csv``, which `read_polylines` reads back exactly. It is written under a temporary name and
-        renamed, so that an existing file survives a failure.
+        A ``.svg`` or ``.csv`` file, which `read_polylines` reads back exactly. It is written under a temporary name
+        and renamed, so that an existing file survives a failure.
 
     Raises
     ------
@@ -471,7 +506,7 @@ def write_polylines(lines: Polyline | Sequence[Polyline], path: PathLike) -> Non
 
 
 def read_geojson(path: PathLike) -> list[tuple[Floats, bool]]:
-    """Read the lines of GeoJSON, and the rings of its polygons."""
+    """Return the (n, 2) points of lines and of the rings of polygons in GeoJSON, and whether each is closed."""
     try:
         geometry = geometry_of(json.loads(contents(path)))
     except (ValueError, RecursionError) as error:
@@ -486,13 +521,15 @@ DXF_SAG = 1e-3
 
 
 def read_dxf(path: PathLike) -> list[tuple[Floats, bool]]:
-    """Read the lines of a DXF drawing, those of blocks in their places, as seen from above; bends become segments.
+    """Return the (n, 2) points of each line of a DXF drawing, seen along z, and whether it is closed.
+
+    Lines of blocks are read where these are inserted, and curved lines become segments.
 
     Such files have no rule for filling, and parts with holes are drawn as outlines that run either way: closed ones
     become the outlines of what lies within an odd number of them, copies left out.
     """
-    found = parsed("dxf", path, "ezdxf", ".dxf files", sag=DXF_SAG)
-    lines = np.split(found["points"], np.cumsum(found["counts"])[:-1])
+    drawing = parsed("dxf", path, "ezdxf", ".dxf files", sag=DXF_SAG)
+    lines = np.split(drawing["points"], np.cumsum(drawing["counts"])[:-1])
     drawn = [Polyline(p, len(p) > 2 and bool((p[0] == p[-1]).all())) for p in lines if (p != p[0]).any()]
     outlines, _, _ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", 1 / FINEST_DRAWING)
     return [(line.points, line.closed) for line in outlines]

@@ -40,15 +40,18 @@ CONVENTION = (
     "signed distance, positive on the side that the normals point to (negative inside an outward-oriented shape); "
     "values[i, j, k] at origin + (i, j, k) * spacing, axes x, y, z, in the units of the shape"
 )
+"""Note in files of fields on grids that says what the values mean."""
 OF_BANDS = (
     "signed distance, negative inside; values[n, i, j, k] at origin + (8 * places[n] + (i, j, k)) * spacing, axes "
     "x, y, z, in the units of the shape; elsewhere coarse_values[i, j, k] at origin + (i, j, k) * coarse_spacing"
 )
+"""The same note in archives of fields in bands."""
 CLIPPED = "signed distance, negative inside, in the units of the shape; beyond the band plus or minus its half width"
+"""The same note in files that hold a field in a band as values at all nodes."""
 OF_CLOUDS = ("normals", "areas", "n_neighbors")
 """Arrays of the archive of a field on a point cloud, besides its points."""
 _DIMENSIONS = {".vti": (1, 2, 3), ".vdb": (3,)}
-"""Numbers of axes that a format supports; the others support any number."""
+"""Numbers of axes that a format of fields supports. Formats that are not named support any number."""
 
 
 def write_field(field: Field[Any], path: PathLike) -> None:
@@ -98,7 +101,20 @@ def save_field(field: Field[Any], path: PathLike) -> None:
 
 
 def ensure_field_writable(path: PathLike, in_band: bool = False) -> None:
-    """Check that a field can be written, in a band or whole, before a long computation."""
+    """Raise an error if a field cannot be written to a file, before a long computation.
+
+    Parameters
+    ----------
+    path : str or path
+        The file, whose extension gives the format.
+    in_band : bool
+        Whether the field will lie in a band, which fewer formats support.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown or does not support such fields, or the folder is not writable.
+    """
     ensure_writable(path, BAND_FORMATS if in_band else FIELD_FORMATS, "a field in a band" if in_band else "a field")
 
 
@@ -115,8 +131,8 @@ def read_field(path: PathLike) -> Field:
     Returns
     -------
     Field
-        Its diagnostics are empty. From ``.npz`` it has the solid that it was the distance to, and is exact between
-        nodes as before. From all other formats it is interpolated.
+        The field, with empty diagnostics. From ``.npz`` it has its solid again, if it had one, so that it is as exact
+        between nodes as before. From all other formats, values between nodes are interpolated.
 
     Raises
     ------
@@ -163,7 +179,7 @@ def read_field(path: PathLike) -> Field:
 
 
 def made(kind: Callable[..., Any], *parts: Any, **options: Any) -> Any:
-    """Make an object of a class from parts of a file; turn a `GeometryError` of it into a `FileFormatError`."""
+    """Call `kind` with parts of a file, such as a class; raise a `FileFormatError` where it raises `GeometryError`."""
     try:
         return kind(*parts, **options)
     except GeometryError as error:
@@ -193,7 +209,7 @@ def load_vertex_field(path: PathLike) -> Field[SurfaceShape]:
 
 
 def _load_tet_field(path: PathLike) -> Field[TetMesh]:
-    """Read a field on tets."""
+    """Read a field on a tet mesh, whose values are point data named `VALUES_NAME`."""
     with reading(path):
         cells = load_cells(path)
         if VALUES_NAME not in cells.point_data:
@@ -239,7 +255,7 @@ def _write_npz(field: Field[Grid], path: Path) -> None:
 
 
 def _held_solid(path: PathLike) -> SolidQueries | None:
-    """Return the solid of a field in an archive, if the archive holds one."""
+    """Read what a field in an archive is the distance to, or return None if the archive holds no solid."""
     if "solid_factor" not in names_in_npz(path):
         return None
     arrays = read_npz(
@@ -252,6 +268,7 @@ def _held_solid(path: PathLike) -> SolidQueries | None:
 
 
 def _write_npy(field: Field[Grid], path: Path) -> None:
+    """Write the values of a field; origin and spacing go to another file."""
     with path.open("wb") as file:
         np.save(file, field.values, allow_pickle=False)
 
@@ -269,12 +286,13 @@ def _write_for_vtk(field: Field[Any], path: Path) -> None:
 
 
 def _write_nrrd(field: Field[Grid], path: Path) -> None:
+    """Write a field on a grid as an image along x, y and z."""
     axes = np.diag(field.domain.spacing)
     write_nrrd(path, field.values, axes, field.domain.origin, content=VALUES_NAME, convention=CONVENTION)
 
 
 def whole_values(field: Field[Band]) -> NDArray[np.float32]:
-    """Return the values of a band at all nodes of its grid; beyond the band they are plus or minus its half width."""
+    """Return (nx, ny, nz) values of a field in a band, clipped to plus or minus the half width of the band."""
     grid, width = field.domain, np.float32(field.domain.width)
     counts = -(-np.array(grid.shape) // BLOCK)
     places = np.argwhere(np.ones(counts, dtype=bool))
@@ -297,7 +315,7 @@ def save_with_values(shape: SurfaceShape, path: PathLike, name: str, values: NDA
 
 
 def _write_vertex_npz(field: Field[SurfaceShape], path: PathLike) -> None:
-    """Write values at vertices, and the mesh or cloud that they are on, as arrays of an ``.npz`` file."""
+    """Write a field on a mesh or a point cloud to an ``.npz`` file, with the arrays of its domain."""
     domain = field.domain
     arrays: dict[str, Any] = {"values": field.values, "vertices": elements(domain).points}
     if isinstance(domain, TriangleMesh):
@@ -310,8 +328,9 @@ def _write_vertex_npz(field: Field[SurfaceShape], path: PathLike) -> None:
 
 
 _VALUES: dict[str, Callable[[PathLike, tuple[str, ...]], Elements]] = {".ply": read_ply, ".vtp": read_vtp}
+"""Readers of surfaces with values at their vertices, which take the names of these, by extension."""
 VALUE_FORMATS: dict[str, Callable[[Elements, PathLike], bytes]] = {".ply": write_ply, ".vtp": write_vtp}
-"""Formats of surfaces with values at their vertices."""
+"""Writers of surfaces with values at their vertices, by extension."""
 _GRID_WRITERS: dict[str, Callable[[Field[Any], Path], None]] = {
     ".npy": _write_npy,
     ".npz": _write_npz,

@@ -27,6 +27,7 @@ from .budgets import account, charge
 PathLike = str | os.PathLike[str]
 T = TypeVar("T")
 PACKAGE = f"{__package__.partition('.')[0]}."
+"""Prefix of the names of all modules of this package."""
 BYTES_PER_FILE_BYTE = {".stl": 5, ".ply": 2}
 """Measured memory to read a shape per byte of its file, reduced for formats that hold more than positions and faces.
 For other formats, readers estimate memory from the first parts of the file."""
@@ -45,7 +46,7 @@ def extension(path: PathLike) -> str:
 
 
 def format_for(path: PathLike, formats: Mapping[str, T], purpose: str) -> T:
-    """Look up the extension of a file in a table of formats; raise `FileFormatError` if it is missing."""
+    """Return the entry of a table of formats for the extension of a file; raise `FileFormatError` if it has none."""
     ending = extension(path)
     if ending not in formats:
         cause = f"'{ending}' is not a known format" if ending else "the name has no extension"
@@ -81,9 +82,10 @@ def refuse_kind(kind: str, path: PathLike, holds: str, instead: str) -> FileForm
 
 @contextmanager
 def reading(path: PathLike) -> Iterator[None]:
-    """Turn exceptions of parsers into errors that name the file; unexpected ones of other code of this package pass.
+    """Convert exceptions of parsers within a ``with`` block to errors that name the file.
 
-    What is read within it is charged to the budget of the file.
+    Unexpected exceptions of code of this package outside its readers are raised unchanged. Whatever is read within the
+    block is charged to the budget of the file.
     """
     try:
         with account(path), np.errstate(all="ignore"):  # no warnings: shapes and fields check their values themselves
@@ -106,14 +108,14 @@ def reading(path: PathLike) -> Iterator[None]:
 
 
 def _is_ours(error: BaseException) -> bool:
-    """Whether the last frame of this package in the traceback lies outside the readers."""
+    """Whether code of this package outside its readers raised an exception, by the last such frame of its traceback."""
     names = [str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__)]
     ours = [name for name in names if name.startswith(PACKAGE)]
     return bool(ours) and not ours[-1].startswith(READING_MODULES)
 
 
 def contents(path: PathLike) -> bytes:
-    """Return the bytes of a file."""
+    """Read a regular file; an empty one is refused."""
     with _opened(path) as (file, size), account(path):
         charge(bytes=BYTES_PER_FILE_BYTE.get(extension(path), 1) * size)
         data = file.read()
@@ -123,7 +125,7 @@ def contents(path: PathLike) -> bytes:
 
 
 def size_of(path: PathLike) -> int:
-    """Return the size of a file that another package reads; refuse the same files as `contents`."""
+    """Return the size in bytes of a file that another package reads; raise an error unless it is a regular file."""
     with _opened(path) as (_, size):
         return size
 
@@ -184,7 +186,22 @@ def text(path: PathLike) -> str:
 
 
 def ensure_writable(path: PathLike, formats: Collection[str], purpose: str) -> None:
-    """Check that a result can be written, before a long computation."""
+    """Raise an error if a result cannot be written to a file, before a long computation.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    formats : collection of str
+        Extensions that it may have.
+    purpose : str
+        What is written, such as ``"a shape"``, for the message.
+
+    Raises
+    ------
+    FileFormatError
+        If it has another extension, or its folder is not writable.
+    """
     format_for(path, dict.fromkeys(formats), purpose)
     with writing(path):
         os.unlink(_new_file(path))
@@ -219,7 +236,10 @@ def move_into_place(source: Path, path: PathLike) -> None:
 
 
 def replaceable(path: PathLike) -> os.stat_result | None:
-    """Return the status of the file that writing would replace, or None; raise if it is not writable."""
+    """Return the status of the file that writing would replace, or None if there is none.
+
+    Raise an error if it is not a regular file or not writable.
+    """
     real = Path(os.path.realpath(path))
     status = os.stat(real) if real.exists() else None
     if status is not None and not stat.S_ISREG(status.st_mode):

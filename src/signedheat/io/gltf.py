@@ -20,13 +20,15 @@ from .files import PathLike, companion_contents, contents, damaged
 from .numerals import integer, integers
 
 COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-"""Types of the components of accessors."""
+"""NumPy types of the numbers of an accessor, by its code ``componentType``."""
 COMPONENT_COUNTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+"""Numbers in each entry of an accessor, by its ``type``."""
 SUPPORTED = ("KHR_mesh_quantization", "KHR_materials_", "KHR_texture_", "KHR_lights_", "KHR_xmp", "EXT_texture_")
 """Prefixes of extensions that are supported or do not affect shapes."""
 INSTANCES = "EXT_mesh_gpu_instancing"
+"""Extension by which a node repeats a mesh, which is refused."""
 TRIANGLE_MODE, FAN_MODE = 4, 6
-"""Modes of lists and fans of triangles; between them is that of strips, below them are points and lines."""
+"""Codes of primitives with lists and fans of triangles; 5 means strips, and 0 to 3 points and lines."""
 
 
 def read_bodies(path: PathLike) -> list[Body]:
@@ -41,13 +43,13 @@ def read_bodies(path: PathLike) -> list[Body]:
             remedy="export it without compression and extensions",
             element=missing[0],
         )
-    places = list(_places(scene.tree))
-    meshes = {mesh: _named(scene.tree, "meshes", mesh)["primitives"] for mesh in dict.fromkeys(m for m, _ in places)}
+    instances = list(_instances(scene.tree))
+    meshes = {mesh: _named(scene.tree, "meshes", mesh)["primitives"] for mesh in dict.fromkeys(m for m, _ in instances)}
     sizes = {mesh: sum(scene.size(primitive) for primitive in primitives) for mesh, primitives in meshes.items()}
-    made = sum(sizes.values()) + sum(sizes[mesh] for mesh, _ in places)
-    charge(BYTES_PER_PLACED * made, sum(len(meshes[mesh]) for mesh, _ in places), made)
+    made = sum(sizes.values()) + sum(sizes[mesh] for mesh, _ in instances)
+    charge(BYTES_PER_PLACED * made, sum(len(meshes[mesh]) for mesh, _ in instances), made)
     bodies = {mesh: [scene.body(primitive) for primitive in primitives] for mesh, primitives in meshes.items()}
-    return [placed(body, matrix) for mesh, matrix in places for body in bodies[mesh] if len(body[1])]
+    return [placed(body, matrix) for mesh, matrix in instances for body in bodies[mesh] if len(body[1])]
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class _Scene:
     buffers: list[bytes]
 
     def size(self, primitive: dict[str, Any]) -> int:
-        """Return the number of vertices and triangles of a primitive that its accessors announce, or more."""
+        """Return an upper bound of the number of vertices plus triangles of a primitive, from its accessors."""
         named = primitive["attributes"].get("POSITION"), primitive.get("indices")
         counts = [self.count(index) for index in named if index is not None]
         per_triangle = 3 if _mode(primitive) == TRIANGLE_MODE else 1
@@ -81,7 +83,7 @@ class _Scene:
         return points[used], np.searchsorted(used, faces)
 
     def count(self, index: object) -> int:
-        """Return how many numbers or vectors an accessor announces, which are no more than there are bytes."""
+        """Return how many numbers or vectors an accessor announces; raise if there are more than bytes in the file."""
         count = integer(_named(self.tree, "accessors", index)["count"], "count", 1)
         if count > sum(map(len, self.buffers)):
             raise damaged(f"accessor {index} announces {count} numbers, which the file does not have")
@@ -99,14 +101,14 @@ class _Scene:
             sparse, values = accessor["sparse"], values.copy()
             code = np.dtype(COMPONENT_TYPES[sparse["indices"]["componentType"]])
             changed = integer(sparse["count"], "count", 1)
-            places = integers(self._viewed(sparse["indices"], code, changed, 1), "sparse indices", 0).ravel()
-            values[places] = self._viewed(sparse["values"], dtype, changed, width)
+            rows = integers(self._viewed(sparse["indices"], code, changed, 1), "sparse indices", 0).ravel()
+            values[rows] = self._viewed(sparse["values"], dtype, changed, width)
         if accessor.get("normalized") and dtype.kind in "iu":
             return np.maximum(values.astype(np.float64) / np.iinfo(dtype).max, -1.0)
         return values
 
     def _viewed(self, part: dict[str, Any], dtype: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
-        """Return (count, width) numbers in a view of a buffer."""
+        """Return the (count, width) numbers of a type in the view of a buffer that a part of the scene names."""
         view = _named(self.tree, "bufferViews", part["bufferView"])
         number, row = integer(view["buffer"], "buffer"), width * dtype.itemsize
         if number >= len(self.buffers):
@@ -160,7 +162,7 @@ def _named(tree: dict[str, Any], kind: str, index: object) -> dict[str, Any]:
 
 
 def _mode(primitive: dict[str, Any]) -> int:
-    """Return how the corners of a primitive form triangles."""
+    """Return the code that says how the corners of a primitive form points (0), lines (1–3) or triangles (4–6)."""
     mode = integer(primitive.get("mode", TRIANGLE_MODE), "mode")
     if mode > FAN_MODE:
         raise damaged(f"primitives have the mode {mode}, which is not defined in glTF")
@@ -168,12 +170,12 @@ def _mode(primitive: dict[str, Any]) -> int:
 
 
 def _integer(part: dict[str, Any], name: str, default: int | None = None) -> int:
-    """Return an integer of a part of the scene that is not negative."""
+    """Return the entry `name` of a part of the scene, an integer that must not be negative."""
     return integer(part.get(name, default), name)
 
 
 def _triangles(corners: Ints, mode: int) -> Ints:
-    """Return the triangles, (m, 3), of a list, strip or fan of corners."""
+    """Return the (m, 3) triangles of a list, strip or fan of corners, depending on the mode (4, 5 or 6)."""
     if mode == TRIANGLE_MODE:
         if len(corners) % 3:
             raise damaged(f"{len(corners)} corners do not form triangles")
@@ -187,8 +189,11 @@ def _triangles(corners: Ints, mode: int) -> Ints:
     return faces[distinct]  # strips are joined by triangles with equal corners
 
 
-def _places(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
-    """Yield the number of each mesh and the (4, 3) transform of rows that places it; each node must occur only once."""
+def _instances(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
+    """Yield the number of a mesh and its (4, 3) transform for each node of the scene that has one.
+
+    Rows (x, y, z, 1) are multiplied by the transform from the right. Each node must occur only once.
+    """
     nodes, scenes = tree.get("nodes", []), tree.get("scenes", [])
     if not nodes:
         yield from ((mesh, np.eye(4, 3)) for mesh in range(len(tree.get("meshes", []))))

@@ -39,11 +39,12 @@ NIBABEL = ("nibabel", "NIfTI files")
 nibabel: Any = lazy_module(*NIBABEL)
 
 CONFIDENCE = "confidence"
+"""Name of the array in a file that has the confidence of a field in its values."""
 NIFTI = (".nii", ".nii.gz")
 SPACE_NAMES = {"RAS": "right-anterior-superior", "LPS": "left-posterior-superior", "LAS": "left-anterior-superior"}
-"""Spaces by their short names in NRRD files."""
+"""Full names of spaces by their short names in NRRD files."""
 JOINED = {"datafile": "data file", "lineskip": "line skip", "byteskip": "byte skip", "centerings": "centers"}
-"""Synonyms of fields of NRRD files."""
+"""Names of fields of NRRD files by their synonyms."""
 _CODES = {
     name: code
     for names, code in (
@@ -62,7 +63,7 @@ _CODES = {
 }
 
 COPIES = 2
-"""Times that the values of an image are held while they are read, and again while they are checked: measured."""
+"""Number of times that the values of an image are in memory while they are read or checked, as measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,7 @@ def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
 
 
 def _aligned(values: NDArray[Any], origin: Any, spacing: Any, **others: Any) -> Image:
-    """Make an image whose axes are x, y, z; the spacing is one number, or one for each axis."""
+    """Make an image whose axes are x, y, z; the spacing is a number, or (d,) numbers."""
     steps = np.asarray(spacing, dtype=np.float64)
     steps = np.full(values.ndim, steps) if steps.ndim == 0 else steps
     return Image(values, np.diag(steps), np.asarray(origin, dtype=np.float64), **others)
@@ -115,17 +116,19 @@ def _read_npy(path: PathLike) -> Image:
 
 
 def _read_npz(path: PathLike) -> Image:
+    """Read values with their origin, spacing and, if the archive has it, confidence."""
     arrays = read_npz(path, (CONFIDENCE,), needed=("values", "origin", "spacing"))
     return _aligned(arrays.pop("values"), arrays.pop("origin"), arrays.pop("spacing"), **arrays)
 
 
 def _read_vti(path: PathLike) -> Image:
+    """Read the values that the file says to show, and an array named `CONFIDENCE` if there is one."""
     values, origin, spacing, confidence = read_vti(path, CONFIDENCE)
     return _aligned(values, origin, spacing, confidence=confidence)
 
 
 def _read_nrrd(path: PathLike) -> Image:
-    """Read an image; a data file that the header names must lie in the same folder or below it."""
+    """Read an image whose header may name another file with its data, in the same folder or below it."""
     header, rest = _nrrd_header(contents(path))
     companion = header.get("data file")
     if companion is not None:
@@ -201,13 +204,30 @@ def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtyp
 
 
 def _truncated(there: int, announced: int) -> FileFormatError:
+    """Return the error for a file that has fewer values, bytes or lines than its header announces."""
     return damaged(f"it announces {announced}, and {there} are there: it is truncated")
 
 
 def write_nrrd(
     path: PathLike, values: NDArray[Any], axes: Floats, origin: Floats, space: str | None = None, **keys: str
 ) -> None:
-    """Write values, indexed [x, y, z]; the columns of `axes` are the steps along x, y, z. `keys` go into the header."""
+    """Write an image.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    values : (n₁, …, n_d) float
+        The values, indexed [x, y, z].
+    axes : (d, d) float
+        The steps from value to value along each axis, in columns.
+    origin : (d,) float
+        The position of the first value.
+    space : str, optional
+        The meaning of the axes of the world, such as ``"left-posterior-superior"``.
+    **keys : str
+        Further lines of the header, by name.
+    """
     data = np.asfortranarray(values).astype(values.dtype.newbyteorder("<"), copy=False)
     header = {
         "type": next(name for name, code in _CODES.items() if code == data.dtype.str[1:]),
@@ -228,10 +248,12 @@ def write_nrrd(
 
 
 def _nrrd_vector(numbers: list[float]) -> str:
+    """Format a vector like ``(1.0,0.0,0.0)``."""
     return f"({','.join(map(repr, numbers))})"
 
 
 def _read_nifti(path: PathLike) -> Image:
+    """Read an image without further axes of length 1, such as that of time."""
     parts = parsed("nifti", path, *NIBABEL, bytes_per_byte=4000)  # gzip may pack a thousand bytes into one
     values, affine = parts["values"], parts["affine"]
     while values.ndim > 3 and values.shape[-1] == 1:

@@ -1,4 +1,4 @@
-"""Key figures of fields and shapes, ready for JSON."""
+"""Key figures of fields and shapes, as dictionaries that JSON can hold."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Report = SurfaceReport | CloudReport | TetReport
 
 
 def describe(field: Any) -> dict[str, Any]:
-    """Return key figures of a field, for ``--json``."""
+    """Return key figures of a field by name, as ``--json`` prints them."""
     if isinstance(field.domain, Grid):
         note = field.diagnostics.note(SampledSource)
         where = {
@@ -50,7 +50,7 @@ def describe(field: Any) -> dict[str, Any]:
 
 
 def surface_confidence(field: Field[Grid]) -> float | None:
-    """Mean confidence at the nodes within a cell of the zero set; None without confidence or such nodes."""
+    """Return the mean confidence at nodes nearer to the surface than a cell; None without confidence or such nodes."""
     cell = float(field.domain.spacing.max())
     near = (field.values < cell) & (field.values > -cell)
     if field.confidence is None or not near.any():
@@ -70,22 +70,25 @@ def snake(name: str) -> str:
 
 
 def inspected(thing: Any) -> tuple[Report, Orientation | None, Widths | None]:
-    """Count what a shape or a solid has; also how a mesh is oriented, and the walls and gaps of a mesh or a solid."""
-    shape, found = as_shape(thing), None
+    """Return a report on a shape or solid, the orientation of a mesh, and the widths of walls and gaps.
+
+    Only meshes have an orientation, and only meshes and solids have widths; otherwise these are None.
+    """
+    shape, oriented = as_shape(thing), None
     outwards: TriangleMesh | PolygonMesh | None = None
     if isinstance(thing, Solid):  # there is nothing left to orient, and its completion is no defect
         outwards = TriangleMesh(*indexed(thing.outward)) if thing.bounding.any() else None
     elif isinstance(shape, TriangleMesh | PolygonMesh):
-        found = orientation(shape)
-        outwards = found.shape
-    return inspect(shape), found, None if outwards is None else widths(outwards)
+        oriented = orientation(shape)
+        outwards = oriented.shape
+    return inspect(shape), oriented, None if outwards is None else widths(outwards)
 
 
-def shape_figures(thing: Any, counts: Report, found: Orientation | None, measured: Widths | None) -> dict[str, Any]:
-    """Return as one what was `inspected`."""
+def shape_figures(thing: Any, counts: Report, oriented: Orientation | None, measured: Widths | None) -> dict[str, Any]:
+    """Return key figures of a shape or solid by name, from the three results of `inspected`."""
     figures = {"kind": type(thing).__name__, **asdict(counts)}
-    if found is not None:
-        figures["orientation"] = found.summary
+    if oriented is not None:
+        figures["orientation"] = oriented.summary
     if measured is not None:
         figures["thickness"] = {**asdict(measured), "spacing": measured.spacing}
     return figures

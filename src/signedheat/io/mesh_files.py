@@ -26,9 +26,9 @@ KEYWORDS = frozenset(
     "v vt vn vp f fo l p o g s mg lod mtllib usemtl maplib usemap cstype deg bmat step curv curv2 surf parm trim hole "
     "scrv sp end con bevel c_interp d_interp shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
 )
-"""Keywords of lines of OBJ files."""
+"""Keywords of lines of OBJ files. Lines with other keywords are damaged if they match `NUMBER_LINE`."""
 NUMBER_LINE = re.compile(r"[-+.eE\d/ ]+")
-"""Matches lines of numbers with any keyword."""
+"""Matches a line of numbers without its keyword."""
 ANNOUNCED_ROUNDING = 1e-4
 """Rounding error, relative to the size of a shape, above which a warning is issued."""
 _HEADER = 84  # bytes of the header of STL: 80 of comment, 4 that count the facets
@@ -52,7 +52,7 @@ def read_stl(path: PathLike) -> TriangleMesh:
 
 
 def write_stl(shape: Elements, path: PathLike) -> bytes:
-    """Write binary STL in single precision, with a warning if that is inaccurate for the shape."""
+    """Return binary STL in single precision, with a warning if that is inaccurate for the shape."""
     if shape.kind != "TriangleMesh":
         kinds = ".obj, .ply, .off or .vtp" if len(shape.counts) else ".ply or .xyz"
         raise refuse_kind(shape.kind, path, "triangles", kinds)
@@ -69,11 +69,11 @@ def write_stl(shape: Elements, path: PathLike) -> bytes:
 
 
 def warn_of_rounding(points: Floats, rounded: Floats) -> None:
-    """Warn if rounding joins vertices of a shape, or moves them far relative to its size."""
+    """Warn if rounding joins vertices of a shape, or moves them by more than `ANNOUNCED_ROUNDING` of its size."""
     largest_move = float(np.abs(points - rounded).max())
-    places, rounded_places = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
-    if places > rounded_places or largest_move > ANNOUNCED_ROUNDING * float(np.ptp(points, axis=0).max()):
-        joined = f" and joins {places - rounded_places:,} of them to others" if places > rounded_places else ""
+    n_distinct, n_rounded = (np.count_nonzero(same_positions(p) == np.arange(len(p))) for p in (points, rounded))
+    if n_distinct > n_rounded or largest_move > ANNOUNCED_ROUNDING * float(np.ptp(points, axis=0).max()):
+        joined = f" and joins {n_distinct - n_rounded:,} of them to others" if n_distinct > n_rounded else ""
         warn_user(
             f"the single precision of STL moves vertices by up to {largest_move:.2g}{joined}: save it as .ply, or move "
             "it to the origin first",
@@ -86,11 +86,11 @@ def _text_corners(data: bytes) -> Floats:
     ends = len(re.findall(rb"(?mi)^[ \t]*endsolid\b", data))
     charge_words(data)
     words = re.sub(rb"(?mi)^[ \t]*(end)?solid\b[^\r\n]*", b"", data).lower().split()  # names may hold keywords
-    places: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
-    for place, word in enumerate(words):
-        if word in places:
-            places[word].append(place)
-    begins, stops, corners = places.values()
+    indices: dict[bytes, list[int]] = {b"facet": [], b"endfacet": [], b"vertex": []}
+    for index, word in enumerate(words):
+        if word in indices:
+            indices[word].append(index)
+    begins, stops, corners = indices.values()
     if not ends or len(begins) != len(stops):
         raise damaged(
             f"{len(begins)} facets begin, {len(stops)} and {ends} solids end: the file is truncated or damaged"
@@ -115,7 +115,7 @@ def _indexed(corners: NDArray[np.floating]) -> TriangleMesh:
 
 
 def _rows_of_words(words: list[str], counts: Ints) -> Iterator[str]:
-    """Join words to lines, each of as many words as `counts` says."""
+    """Join the words to one line for each of the counts, which say how many words it has."""
     return (" ".join(islice(left, count)) for left in [iter(words)] for count in counts.tolist())
 
 
@@ -147,7 +147,7 @@ def read_obj_elements(path: PathLike) -> tuple[Floats, list[list[int]], list[lis
 
 
 def write_obj(shape: Elements, path: PathLike) -> bytes:
-    """Write OBJ text: ``v`` lines, and ``vn`` lines for normals of points; the first value is a texture coordinate."""
+    """Return OBJ text of vertices, faces and normals of points. Of values, the first become texture coordinates."""
     rows = ["v {!r} {!r} {!r}".format(*p) for p in shape.points.tolist()]
     if shape.normals is not None:
         rows += ["vn {!r} {!r} {!r}".format(*n) for n in shape.normals.tolist()]
@@ -161,14 +161,18 @@ def write_obj(shape: Elements, path: PathLike) -> bytes:
 
 
 def write_pc(shape: Elements, path: PathLike) -> bytes:
-    """Write oriented points as OBJ text."""
+    """Return OBJ text of a point cloud with its normals; other shapes are refused."""
     if shape.kind != "PointCloud":
         raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
     return write_obj(shape, path)
 
 
 def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
-    """Return lines as lists of words, by keyword; in each, the number of vertices so far replaces the keyword."""
+    """Return the lines with vertices, normals and elements as lists of words, by keyword.
+
+    The first entry of each list is not the keyword but the number of vertices on lines before, from which negative
+    vertex ids count back.
+    """
     lines: dict[str, list[list[Any]]] = {"v": [], "vn": [], "f": [], "l": [], "p": []}
     content = text(path)
     charge_words(content)
@@ -189,7 +193,10 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
 
 
 def _coordinates(rows: list[list[Any]], what: str) -> Floats:
-    """Return the first three numbers of each line, (n, 3); weights and colours are ignored."""
+    """Return (n, 3) coordinates on n lines of `_lines_by_keyword`; weights and colours after them are ignored.
+
+    `what` names them in messages.
+    """
     short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
     if short is not None:
         cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
@@ -198,7 +205,11 @@ def _coordinates(rows: list[list[Any]], what: str) -> Floats:
 
 
 def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
-    """Return the vertex ids of all elements, from 0, and how many each has; in the file, −1 is the vertex before it."""
+    """Return the vertex ids of all elements, one after another and counted from 0, and how many ids each element has.
+
+    The elements are lines of `_lines_by_keyword`. In the file, ids count from 1, and −1 is the last vertex before the
+    element.
+    """
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
@@ -252,21 +263,24 @@ def read_off(path: PathLike) -> Elements:
 
 
 def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> Iterator[list[str]]:
-    """Yield each line, joined with the next ones until it has at least as many words as `length` says."""
+    """Yield records that may span several lines: `length` tells from the first line how many words they have."""
     for row in lines:
-        wanted = length(row)
-        while len(row) < wanted and (more := next(lines, None)) is not None:
+        n_words = length(row)
+        while len(row) < n_words and (more := next(lines, None)) is not None:
             row += more
         yield row
 
 
 def _corner_count(word: str) -> int:
-    """Return the number of corners that a face announces; 0 if the word is no number, which is refused later."""
+    """Convert the word before the vertex ids of a face to their number; return 0 if it is not a number.
+
+    Such words are refused later.
+    """
     return int(word) if word.isascii() and word.isdecimal() and len(word) < 19 else 0
 
 
 def write_off(shape: Elements, path: PathLike) -> bytes:
-    """Write OFF text; oriented points as NOFF."""
+    """Return OFF text, or NOFF text if there are normals."""
     columns = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
     rows = ["OFF" if shape.normals is None else "NOFF", f"{len(columns)} {len(shape.counts)} 0"]
     rows += [" ".join(map(repr, row)) for row in columns.tolist()]

@@ -18,39 +18,39 @@ from .files import damaged
 
 
 def parsed_numbers(words: Sequence[Any], what: str) -> Floats:
-    """Convert words of a text, or rows of them, to real numbers."""
+    """Convert words of a text, or rows of words, to an array of real numbers; `what` names them in messages."""
     _refuse_odd(words, what)
     try:
         return np.array(words, dtype=np.float64)
     except (ValueError, OverflowError) as error:
-        raise _not(what, "numbers", error) from error
+        raise _no_numbers(what, "numbers", error) from error
 
 
 def integers(values: object, what: str, least: int | None = None) -> Ints:
     """Convert words of a text, numbers of JSON or an array to integers; refuse fractions, and numbers below `least`."""
     if isinstance(values, np.ndarray):
-        found = _whole(values, what)
+        converted = _whole(values, what)
     else:
-        found = _parsed(values if isinstance(values, list | tuple) else [values], what)
-    if least is not None and found.size and found.min() < least:
-        at = int(np.argmax(found < least))
-        raise damaged(f"number {at} of {what} is {found.flat[at]}, less than {least}", element=f"number {at}")
-    return found
+        converted = _parsed(values if isinstance(values, list | tuple) else [values], what)
+    if least is not None and converted.size and converted.min() < least:
+        k = int(np.argmax(converted < least))
+        raise damaged(f"number {k} of {what} is {converted.flat[k]}, less than {least}", element=f"number {k}")
+    return converted
 
 
 def integer(value: object, what: str, least: int = 0) -> int:
     """Convert a word of a text or a number of JSON to an integer; refuse fractions, and numbers below `least`."""
     try:
-        [found] = integers([value], what).tolist()
+        [number] = integers([value], what).tolist()
     except FileFormatError as error:
         raise damaged(f"{what} is {_shown(value)}, which is no integer", element=what) from error
-    if found < least:
-        raise damaged(f"{what} is {found}, less than {least}", element=what)
-    return int(found)
+    if number < least:
+        raise damaged(f"{what} is {number}, less than {least}", element=what)
+    return int(number)
 
 
 def _whole(values: NDArray[Any], what: str) -> Ints:
-    """Return an array of whole numbers as integers."""
+    """Convert an array to integers; raise an error unless all its numbers are whole."""
     if values.dtype.kind == "f" and values.size:
         if not (np.abs(values) < INT64_END).all() or (values != np.rint(values)).any():
             raise damaged(f"{what} are not all integers")
@@ -60,7 +60,7 @@ def _whole(values: NDArray[Any], what: str) -> Ints:
 
 
 def _parsed(values: Sequence[Any], what: str) -> Ints:
-    """Return words, or numbers of JSON, as integers."""
+    """Convert words, or numbers of JSON, to integers; raise an error unless all are whole."""
     if all(isinstance(value, str) for value in values) or all(isinstance(value, bytes) for value in values):
         _refuse_odd(values, what)
     else:
@@ -71,11 +71,11 @@ def _parsed(values: Sequence[Any], what: str) -> Ints:
     try:
         return np.array(values, dtype=np.int64)
     except (ValueError, OverflowError) as error:
-        raise _not(what, "integers", error) from error
+        raise _no_numbers(what, "integers", error) from error
 
 
 def _refuse_odd(words: Sequence[Any], what: str) -> None:
-    """Refuse digits and separators that Python knows and files do not have."""
+    """Raise an error if words have digits or underscores that Python reads as numbers and no format allows."""
     if words and isinstance(words[0], list):
         words = [word for row in words for word in row]
     are_bytes = bool(words) and isinstance(words[0], bytes)
@@ -85,9 +85,11 @@ def _refuse_odd(words: Sequence[Any], what: str) -> None:
         raise damaged(f"{what} are not all numbers: one is {_shown(odd)}")
 
 
-def _not(what: str, kind: str, error: Exception) -> FileFormatError:
+def _no_numbers(what: str, kind: str, error: Exception) -> FileFormatError:
+    """Return the error for values that are not all of a kind, such as ``"integers"``."""
     return damaged(f"{what} are not all {kind} ({error}): the file is damaged")
 
 
 def _shown(value: object) -> str:
+    """Return a short description of a value for messages."""
     return f"{value!r:.40}" if isinstance(value, str | bytes | int | float | None) else f"a {type(value).__name__}"

@@ -27,7 +27,22 @@ def read_npy(path: PathLike) -> NDArray[Any]:
 
 
 def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = ()) -> dict[str, NDArray[Any]]:
-    """Read those wanted arrays of a ``.npz`` file that exist, and all needed ones."""
+    """Read arrays of a ``.npz`` file by name.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    wanted : collection of str
+        Names of arrays to read if the file has them.
+    needed : collection of str
+        Names of arrays that the file must have.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged or lacks an array that is needed.
+    """
     data = contents(path)
     with reading(path), ZipFile(io.BytesIO(data)) as archive:
         members = {info.filename: info for info in archive.infolist()}
@@ -44,8 +59,8 @@ def read_npz(path: PathLike, wanted: Collection[str], needed: Collection[str] = 
 def write_npz(path: PathLike, **arrays: Any) -> None:
     """Write the arrays that are not None; an existing file survives a failure."""
     with replacing(path) as temporary, temporary.open("wb") as file:
-        kept: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items() if values is not None}
-        np.savez(file, **kept)
+        given: dict[str, Any] = {name: np.asarray(values) for name, values in arrays.items() if values is not None}
+        np.savez(file, **given)
 
 
 def names_in_npz(path: PathLike) -> set[str]:

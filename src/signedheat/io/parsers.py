@@ -38,7 +38,7 @@ def las(path: str) -> dict[str, Any]:
 
 
 def e57(path: str) -> dict[str, Any]:
-    """Read the points of all scans of an E57 file, each in its own place."""
+    """Read the points of all scans of an E57 file in the coordinates of the file, which are common to the scans."""
     import pye57
 
     file = pye57.E57(path)
@@ -48,7 +48,26 @@ def e57(path: str) -> dict[str, Any]:
 
 
 def step(path: str, deflection: float | None, fineness: float, angle: float) -> dict[str, Any]:
-    """Triangulate a STEP file: points, triangles with ids from 0 in each CAD face, and counts of both for each face."""
+    """Triangulate the CAD faces of a STEP file, one after another.
+
+    Parameters
+    ----------
+    path : str
+        The file.
+    deflection : float or None
+        How far triangles may be off curved faces, in millimetres; by default `fineness` times the diagonal of the box
+        around the shape.
+    fineness : float
+        The default of `deflection`, relative to the diagonal.
+    angle : float
+        Largest angle between neighbouring triangles of curved faces, in radians.
+
+    Returns
+    -------
+    dict
+        The (n, 3) ``points``, the (m, 3) ``triangles``, whose vertex ids count from 0 in each CAD face,
+        ``point_counts`` and ``triangle_counts`` of each CAD face, and the ``diagonal`` of the box.
+    """
     from OCP import Bnd, BRep, BRepBndLib, BRepMesh, IFSelect, Message, STEPControl, TopAbs, TopExp, TopLoc, TopoDS
 
     printer = Message.Message_PrinterOStream.get_type_descriptor_s()
@@ -74,8 +93,8 @@ def step(path: str, deflection: float | None, fineness: float, angle: float) -> 
         points.append(np.array([(node.X(), node.Y(), node.Z()) for node in nodes]).reshape(-1, 3))
         rows = (mesh.Triangle(k) for k in range(1, n_triangles + 1))
         corners = np.array([[row.Value(1), row.Value(2), row.Value(3)] for row in rows], dtype=np.int64).reshape(-1, 3)
-        turned = face.Orientation() == TopAbs.TopAbs_Orientation.TopAbs_REVERSED
-        triangles.append((corners[:, ::-1] if turned else corners) - 1)
+        is_reversed = face.Orientation() == TopAbs.TopAbs_Orientation.TopAbs_REVERSED
+        triangles.append((corners[:, ::-1] if is_reversed else corners) - 1)
         walk.Next()
     return {
         "points": np.concatenate(points),
@@ -102,7 +121,11 @@ def dae(path: str) -> dict[str, Any]:
 
 
 def cells(path: str, module: str) -> dict[str, Any]:
-    """Read points, cells and values at the points by one of meshio's modules."""
+    """Read points, cells and values at the points by one of meshio's modules.
+
+    Blocks of cells are named ``"cells 0"``, ``"cells 1"``, …, with their kinds in ``"kinds"``.
+    Values are named ``"values 0"``, …, with their names in ``"names"``.
+    """
     from importlib import import_module
 
     mesh = import_module(f"meshio.{module}").read(path)
@@ -123,7 +146,10 @@ def nifti(path: str) -> dict[str, Any]:
 
 
 def dxf(path: str, sag: float) -> dict[str, Any]:
-    """Read the lines of a DXF drawing as seen along z, with their numbers of points; `sag` is relative to its size."""
+    """Read the lines of a DXF drawing as seen along z: all their ``points``, (n, 2), and ``counts`` of points of each.
+
+    Segments are no farther from arcs and splines than `sag` times the size of the drawing.
+    """
     import ezdxf
     from ezdxf.disassemble import recursive_decompose
     from ezdxf.path import make_path
@@ -141,7 +167,7 @@ def dxf(path: str, sag: float) -> dict[str, Any]:
 
 
 def confine(memory: int, seconds: int) -> None:
-    """Limit memory and processor time of this process, and deny it network and other programs.
+    """Limit this process to `memory` bytes and `seconds` of processor time, without network and other programs.
 
     Limits that a system does not support are not set: Windows has none, and only Linux can remove the network. Python's
     own sockets are refused everywhere.
@@ -164,15 +190,15 @@ def confine(memory: int, seconds: int) -> None:
 
 
 def refuse(event: str, _: object) -> None:
-    """Raise an exception at forbidden audit events."""
+    """Raise an exception if an audit event of Python is `FORBIDDEN`, such as opening a socket."""
     if event.startswith(FORBIDDEN):
         raise PermissionError(f"{event} is not for parsers")
 
 
-def answer(found: dict[str, Any], file: Any) -> None:
-    """Write a line of JSON with all values that are not arrays, then the bytes of the arrays."""
-    arrays = {name: np.ascontiguousarray(value) for name, value in found.items() if isinstance(value, np.ndarray)}
-    values = {name: value for name, value in found.items() if name not in arrays}
+def answer(results: dict[str, Any], file: Any) -> None:
+    """Write results to a file: a line of JSON with values and the types and shapes of arrays, then their bytes."""
+    arrays = {name: np.ascontiguousarray(value) for name, value in results.items() if isinstance(value, np.ndarray)}
+    values = {name: value for name, value in results.items() if name not in arrays}
     about = [[name, array.dtype.newbyteorder("=").str, array.shape] for name, array in arrays.items()]
     file.write(json.dumps({"values": values, "arrays": about}).encode() + b"\n")
     for array in arrays.values():
@@ -181,7 +207,10 @@ def answer(found: dict[str, Any], file: Any) -> None:
 
 
 def main(function: str, path: str, options: str, memory: str, seconds: str) -> None:
-    """Parse a file, and write the result to standard output."""
+    """Parse a file by a function of this module, and write the result or the error to standard output.
+
+    `options` is JSON with its further arguments; `memory` and `seconds` are the limits of `confine`.
+    """
     file = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # printed text must not mix with the answer
     warnings.simplefilter("ignore")

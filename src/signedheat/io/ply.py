@@ -34,17 +34,18 @@ PLY_TYPES = {
     for name in names.split()
 }
 PLY_INTEGERS = {name: code for name, code in PLY_TYPES.items() if code[0] != "f"}
-"""Types that may count the entries of a list."""
+"""NumPy types by their names in PLY; and those of integers, which may count the entries of a list."""
 PLY_FACE = np.dtype([("count", "u1"), ("corners", "<i4", 3)])
 
 
 @dataclass
 class _Element:
-    """An element of the header; the type of a property is a code, or for a list the codes of its count and entries."""
+    """An element of the header, such as ``vertex``."""
 
     name: str
-    count: int
+    count: int  # number of its rows
     properties: dict[str, str | tuple[str, str]] = field(default_factory=dict)
+    """NumPy type of each property by name, or for a list the types of its count and of its entries."""
 
     def add(self, name: str, kind: str | tuple[str, str]) -> None:
         """Append a property, whose name must be new."""
@@ -54,7 +55,7 @@ class _Element:
 
 
 def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
-    """Read the faces of a PLY file; if it has none, the triangles of its strips; and without those, its points.
+    """Read the faces of a PLY file, or without faces the triangles of its strips, or without these its points.
 
     Points have normals and areas if the file has ``nx ny nz`` and ``area``; faces have neither. `names` are further
     properties of the vertices to read as `values`; those that the file lacks are left out.
@@ -81,7 +82,7 @@ def read_ply(path: PathLike, names: Sequence[str] = ()) -> Elements:
 
 
 def write_ply(shape: Elements, path: PathLike, colors: NDArray[np.uint8] | None = None) -> bytes:
-    """Write binary PLY in double precision; normals, areas, values and colours are properties of the vertices."""
+    """Return binary PLY in double precision. Normals, areas, values and (n, 3) colours are properties of vertices."""
     given: list[tuple[list[str], NDArray[Any] | None]] = [
         (["x", "y", "z"], shape.points),
         (["nx", "ny", "nz"], shape.normals),
@@ -108,7 +109,23 @@ def _header_of(
     count_type: str = "int",
     comment: str | None = None,
 ) -> bytes:
-    """Return the header of binary PLY with doubles and colours at the vertices, and with faces if there are any."""
+    """Return the header of binary PLY.
+
+    Parameters
+    ----------
+    n_vertices : int
+        Number of vertices.
+    names : sequence of str
+        Names of the properties of vertices that are doubles.
+    n_faces : int
+        Number of faces, which the header leaves out if it is 0 and there is no comment.
+    channels : sequence of str
+        Names of the properties of vertices that are bytes, such as ``"red"``.
+    count_type : str
+        PLY type of the number of corners of a face.
+    comment : str, optional
+        A comment.
+    """
     lines = ["ply", "format binary_little_endian 1.0", *([] if comment is None else [f"comment {comment}"])]
     lines += [f"element vertex {n_vertices}", *(f"property double {name}" for name in names)]
     lines += [f"property uchar {channel}" for channel in channels]
@@ -118,7 +135,10 @@ def _header_of(
 
 
 def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[int, int]:
-    """Write a mesh larger than memory to binary PLY, part by part; return its numbers of vertices and faces."""
+    """Write a mesh larger than memory to binary PLY, part by part, and return its numbers of vertices and faces.
+
+    Each part has (n, 3) vertices and (m, 3) triangles, whose vertex ids are those in the whole mesh.
+    """
     ensure_writable(path, {".ply"}, "a mesh part by part")
     n_vertices = n_faces = 0
 
@@ -147,18 +167,23 @@ def write_parts(parts: Iterator[tuple[Floats, Ints]], path: PathLike) -> tuple[i
 
 
 def _tables(path: PathLike) -> dict[str, dict[str, Any]]:
-    """Return the columns of each element by name; lists give two arrays, of all their entries and of (n,) counts."""
+    """Return the columns of a PLY file, by the names of element and property.
+
+    The column of a list consists of two arrays: the entries of all rows one after another, and the (n,) number of
+    entries in each row.
+    """
     form, elements, body = _header(contents(path).removeprefix(codecs.BOM_UTF8))
     read_element = _text_reader(body) if form == "ascii" else _BinaryReader(body, form).read
     return {element.name: read_element(element) for element in elements}
 
 
 def _columns(table: dict[str, Any], names: Any) -> Floats:
+    """Return columns of a table side by side, such as (n, 3) for the names x, y and z."""
     return np.stack([table[name] for name in names], axis=1).astype(np.float64)
 
 
 def _unrolled(strip: Ints) -> Ints:
-    """Return the triangles of strips separated by −1; every second one has the opposite orientation."""
+    """Return the (m, 3) triangles of strips that −1 separates, with the corners of every second one swapped."""
     windows = np.stack([strip[:-2], strip[1:-1], strip[2:]], axis=1)
     index = np.arange(len(strip))
     begin = np.maximum.accumulate(np.where(np.concatenate([[True], strip[:-1] < 0]), index, 0))
@@ -196,6 +221,7 @@ def _header(data: bytes) -> tuple[str, list[_Element], bytes]:
 
 
 def _truncated(element: _Element) -> FileFormatError:
+    """Return the error for data that end before the announced number of rows of an element."""
     return damaged(
         f"the data end within the {element.count} announced of element '{element.name}': the file is truncated"
     )
@@ -205,9 +231,9 @@ def _truncated(element: _Element) -> FileFormatError:
 class _BinaryReader:
     """Reads the elements of a binary file, one after another."""
 
-    body: bytes
-    form: str
-    at: int = 0
+    body: bytes  # the data after the header
+    form: str  # "binary_little_endian" or "binary_big_endian"
+    at: int = 0  # number of bytes read so far
 
     def __post_init__(self) -> None:
         self.order = "<" if self.form == "binary_little_endian" else ">"
@@ -222,11 +248,14 @@ class _BinaryReader:
         )
         if element.count * smallest > len(self.body) - self.at:
             raise _truncated(element)
-        table = self._all_alike(element, lists)
+        table = self._read_equal_rows(element, lists)
         return self._row_by_row(element) if table is None else table
 
-    def _all_alike(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
-        """Read all rows at once, which is quick, if their lists are as long as in the first row; else return None."""
+    def _read_equal_rows(self, element: _Element, lists: dict[str, tuple[str, str]]) -> dict[str, Any] | None:
+        """Read all rows of an element at once, which is quick, or return None if its lists differ in length.
+
+        `lists` are its properties that are lists.
+        """
         lengths = dict.fromkeys(lists, 0)
         if element.count:
             start, first = self.at, self._row_by_row(replace(element, count=1))
@@ -252,16 +281,16 @@ class _BinaryReader:
         }
 
     def _row_by_row(self, element: _Element) -> dict[str, Any]:
-        """Read the columns of an element whose lists may differ in length."""
+        """Read the columns of an element whose lists may differ in length, as `_tables` returns them."""
         columns: dict[str, list[Any]] = {name: [] for name in element.properties}
         counts: dict[str, list[int]] = {name: [] for name in element.properties}
         for _ in range(element.count):
             for name, kind in element.properties.items():
                 length, code = 1, kind if isinstance(kind, str) else kind[1]
                 if not isinstance(kind, str):
-                    length = int(self._one(kind[0], 1, element)[0])
+                    length = int(self._next(kind[0], 1, element)[0])
                     counts[name].append(length)
-                columns[name].append(self._one(code, length, element))
+                columns[name].append(self._next(code, length, element))
         return {
             name: np.concatenate(columns[name])
             if isinstance(kind, str)
@@ -269,8 +298,8 @@ class _BinaryReader:
             for name, kind in element.properties.items()
         }
 
-    def _one(self, code: str, length: int, element: _Element) -> NDArray[Any]:
-        """Read the next `length` numbers, of the type `code`."""
+    def _next(self, code: str, length: int, element: _Element) -> NDArray[Any]:
+        """Read the next `length` numbers, of the NumPy type `code`."""
         size = length * int(code[1])
         if length < 0 or self.at + size > len(self.body):
             raise _truncated(element)

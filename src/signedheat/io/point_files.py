@@ -22,16 +22,17 @@ from .numerals import integer, parsed_numbers
 from .sandbox import parsed
 
 SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
-"""Replacements of commas and semicolons: both separate numbers, or commas are decimal."""
+"""Tables for `str.translate` that make separators spaces: commas and semicolons, or with decimal commas semicolons."""
 WITH_COMMA = re.compile(r"[-+]?[0-9]+(,[0-9]+)?([eE][-+]?[0-9]+)?")
+"""Matches a number that has a decimal comma or is whole."""
 FIELD_TYPES = {"F": "f", "I": "i", "U": "u"}
-"""Types of fields, with their letters in NumPy."""
+"""Letters of the types of fields in NumPy, by those in PCD files."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 """Namespace of the attributes by which XML names schemas."""
 
 
 def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
-    """Read blocks of lines separated by empty lines; all lines have the same number of numbers, one of `widths`.
+    """Read blocks of lines, which empty lines separate, as (n, k) arrays, where k is one of `widths` and common to all.
 
     Numbers are separated by commas, semicolons, tabs or spaces. Commas are decimal where they all stand between digits
     and something else separates the numbers. Text after ``#`` and a header line are skipped.
@@ -55,9 +56,9 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
             columns = len(values)
             blocks[-1].append(values)
         elif values or columns:
-            wanted = " or ".join(map(str, [columns] if columns else widths))
+            counts = " or ".join(map(str, [columns] if columns else widths))
             raise FileFormatError(
-                f"line {number}, '{line.strip()[:60]}', does not hold {wanted} numbers",
+                f"line {number}, '{line.strip()[:60]}', does not hold {counts} numbers",
                 remedy="give one point per line",
                 element=f"line {number}",
             )
@@ -67,7 +68,7 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
 
 
 def _has_decimal_commas(content: str) -> bool:
-    """Whether commas are decimal: each line has several numbers that other characters separate."""
+    """Whether a text has decimal commas: each line has several numbers that semicolons or spaces separate."""
     if "," not in content:
         return False
     lines = (line.partition("#")[0].replace(";", " ").split() for line in content.split("\n"))
@@ -76,7 +77,10 @@ def _has_decimal_commas(content: str) -> bool:
 
 
 def read_point_lists(path: PathLike, dimension: int) -> list[tuple[Floats, bool]]:
-    """Read the points (n, dimension) of each polyline, which is closed if its last point equals its first."""
+    """Return the (n, dimension) points of each polyline, and whether it is closed.
+
+    It is closed if its last point equals its first, which is then left out.
+    """
     lists = read_rows(path, (dimension,))
     closed = [len(points) > 2 and bool((points[0] == points[-1]).all()) for points in lists]
     return [(points[:-1] if end else points, end) for points, end in zip(lists, closed, strict=True)]
@@ -92,15 +96,15 @@ def write_point_lists(lists: Sequence[tuple[Floats, bool]]) -> str:
 
 
 def read_xyz(path: PathLike) -> Elements:
-    """Read lines of 3 numbers (positions) or 6 (positions and normals, or colours, which are ignored)."""
+    """Read points with 3 numbers on each line, or 6, of which the last are normals or colours, which are ignored."""
     table = np.concatenate(read_rows(path, (3, 6)))
-    others = table[:, 3:]
-    are_colors = (others >= 0).all() and (others == np.rint(others)).all() and others.max(initial=0.0) > 1
-    return Elements(table[:, :3], normals=others if others.size and not are_colors else None)
+    last = table[:, 3:]
+    are_colors = (last >= 0).all() and (last == np.rint(last)).all() and last.max(initial=0.0) > 1
+    return Elements(table[:, :3], normals=last if last.size and not are_colors else None)
 
 
 def write_xyz(shape: Elements, path: PathLike) -> bytes:
-    """Write one line per point."""
+    """Return text with the position and normal of a point on each line."""
     if shape.kind != "PointCloud":
         raise refuse_kind(shape.kind, path, "points", ".obj or .ply")
     table = shape.points if shape.normals is None else np.hstack([shape.points, shape.normals])
@@ -173,13 +177,13 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
 
 
 def read_las(path: PathLike) -> PointCloud:
-    """Read the points of a LAS or LAZ file, scaled and moved as it says; it has no normals."""
+    """Read the points of a LAS or LAZ file, in the coordinates of the scan; such files have no normals."""
     parts = parsed("las", path, "laspy", f"{extension(path)} files", bytes_per_byte=1000)
     return _cloud(parts["points"], path)
 
 
 def read_e57(path: PathLike) -> PointCloud:
-    """Read the points of all scans of an E57 file, each in its place; points marked invalid are left out."""
+    """Read the points of all scans of an E57 file, in their common coordinates, without points marked invalid."""
     ensure_installed("pye57", ".e57 files")
     with reading(path):
         _refuse_references(_e57_description(contents(path)))
@@ -223,6 +227,7 @@ def _refuse_references(description: bytes) -> None:
 
 
 def _cloud(points: Floats, path: PathLike) -> PointCloud:
+    """Make a point cloud of those points that have finite coordinates."""
     points = points[np.isfinite(points).all(axis=1)]
     if not len(points):
         raise FileFormatError("it has no points", path=path)
@@ -230,7 +235,7 @@ def _cloud(points: Floats, path: PathLike) -> PointCloud:
 
 
 def _unpacked(body: bytes, size: int) -> bytes:
-    """Unpack LZF data, which follow two four-byte numbers: their packed and unpacked lengths.
+    """Unpack LZF data of `size` bytes, which follow two four-byte numbers, their packed and unpacked lengths.
 
     A control byte c < 32 is followed by c + 1 bytes to copy. Any other one repeats a part of the result: its upper
     three bits are the length less two (if they are 7, the next byte is added); its lower five bits and the next byte

@@ -32,6 +32,7 @@ PARSER_PROGRAM = (
 LEAST_MEMORY, MEMORY_PER_BYTE = 1 << 29, 100
 """Memory limit of a parser in bytes: a constant part, and a factor of the size of the file."""
 ARRAY_TYPE = re.compile(r"[<>|][biuf][1248]")
+"""Matches NumPy types that a parser may return."""
 ALONE = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS"), "1")
 """Environment variables that limit threads to one, since idle threads take memory."""
 
@@ -48,9 +49,22 @@ def parsed(
 ) -> dict[str, Any]:
     """Parse a file by a function of `parsers` in a process of its own, and return arrays and other values by name.
 
-    The function needs `package`; errors say that this is for a `purpose`. Its memory is limited to `LEAST_MEMORY` and
-    `bytes_per_byte` for each byte of the file, its processor time to `least_seconds` and more for large files, and both
-    to the budget of the file. `options` are passed on to it, and JSON must be able to hold them.
+    Parameters
+    ----------
+    function : str
+        Name of the function.
+    path : str or path
+        The file.
+    package : str
+        The package that the function needs.
+    purpose : str
+        What the package is for, for messages.
+    bytes_per_byte : int
+        Memory that the process may use for each byte of the file, besides `LEAST_MEMORY`.
+    least_seconds : int, optional
+        Processor time that it may use for any file; large files have more. The budget of the file limits both further.
+    **options : object
+        Further arguments of the function, which JSON must be able to hold.
     """
     size = size_of(path)
     ensure_installed(package, purpose)
@@ -87,9 +101,9 @@ def parsed(
 
 
 def _answer(stream: BinaryIO, left: float) -> dict[str, Any] | None:
-    """Read the answer of a parser, values and arrays by name; return None if it is incomplete or malformed.
+    """Read the values and arrays that a parser returns, by name; return None if they are incomplete or malformed.
 
-    Raise `MemoryLimitError` if its arrays have more bytes than are `left`.
+    Raise `MemoryLimitError` if the arrays have more than `left` bytes.
     """
     try:
         about = json.loads(stream.readline(1 << 24))  # longer than any answer without its arrays
@@ -116,7 +130,10 @@ def _answer(stream: BinaryIO, left: float) -> dict[str, Any] | None:
 
 
 def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError:
-    """Return the error for a parser that ended without an answer."""
+    """Return the error for a parser that ended without an answer.
+
+    `status` is the exit status, or minus the number of the signal that ended it; `said` is its last message.
+    """
     number = -status if status < 0 else 0
     name = Signals(number).name if number else f"status {status}"
     if name == "SIGKILL":
@@ -129,13 +146,13 @@ def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError
     return FileFormatError(cause, remedy="write it again, or in another format")
 
 
-def _failed(package: str, purpose: str, found: dict[str, Any], memory: int) -> SignedHeatError:
-    """Return the error for a parser that raised an exception."""
-    kind, message = found["error"], " ".join(str(found["message"]).split())
+def _failed(package: str, purpose: str, values: dict[str, Any], memory: int) -> SignedHeatError:
+    """Return the error for a parser that raised an exception, whose class and message `values` has."""
+    kind, message = values["error"], " ".join(str(values["message"]).split())
     if kind == "MemoryError":
         cause = f"{package} needs more than {memory / 1e9:.2g} GB for it"
         return MemoryLimitError(cause, remedy="check that it is not damaged, or free some memory")
     if kind == "ModuleNotFoundError":
-        return missing_package(found["package"] or package, purpose)
+        return missing_package(values["package"] or package, purpose)
     cause = f"{package} cannot read it ({message or kind:.200})"
     return FileFormatError(cause, remedy="write it again, or in another format")

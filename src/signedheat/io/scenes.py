@@ -37,20 +37,22 @@ METRES = {
 }
 """Units of length, including those of 3MF, in metres."""
 MODEL_PART = "3D/3dmodel.model"
+"""Usual name of the part of a 3MF package that says what to build."""
 PATH = "{http://schemas.microsoft.com/3dmanufacturing/production/2015/06}path"
+"""Attribute that names another part, of 3MF's production extension."""
 MOST_COMPONENT_DEPTH = 32
-"""Largest depth of nested components."""
+"""Largest depth of nested components; deeper ones are refused."""
 
 Key = tuple[str, str]
 """The name of a part, which is a file in a 3MF package, and the id of an object in it."""
 FACET_DEFLECTION = 1e-3
-"""Default distance of triangles from the surface, relative to the diagonal of the box around it."""
+"""Default of the largest distance of triangles from the CAD surface, relative to the diagonal of the box around it."""
 FACET_ANGLE = 0.3
 """Approximate angle between neighbouring triangles of curved faces, in radians: 20 of them around a cylinder."""
 
 
 def _joined(bodies: Sequence[Body]) -> TriangleMesh:
-    """Join bodies to one mesh, one after another."""
+    """Join bodies to a mesh that has their vertices and faces one after another."""
     if not bodies:
         raise FileFormatError("it holds no triangles", remedy="export the shape as a mesh")
     return TriangleMesh(*concatenated(bodies))
@@ -70,7 +72,10 @@ def read_dae(path: PathLike) -> TriangleMesh:
 
 @dataclass
 class _Object:
-    """A mesh, or parts, which are other objects with (4, 3) transforms that multiply rows from the right."""
+    """An object of a 3MF package: a mesh, or components, which are other objects and (4, 3) transforms of their rows.
+
+    Rows (x, y, z, 1) are multiplied by a transform from the right.
+    """
 
     vertices: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     faces: Ints = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
@@ -78,7 +83,7 @@ class _Object:
 
 
 def read_3mf(path: PathLike) -> TriangleMesh:
-    """Read the objects that a 3MF package builds, each in its place, as one mesh in the unit of the file, `unit_of`."""
+    """Read the objects that a 3MF package builds, transformed as it says, as a mesh in the unit of the file."""
     with reading(path):
         package = _Package(path)
         root = package.model(package.root)
@@ -92,7 +97,10 @@ def read_3mf(path: PathLike) -> TriangleMesh:
 
 
 def unit_of(path: PathLike) -> str | None:
-    """Return the unit of length that a file states, m for glTF, mm for STEP; None if it states none, or another."""
+    """Return the unit of length of a file, one of `METRES`, or None if the file does not state one of these.
+
+    It is always m for glTF and mm for STEP.
+    """
     kind = extension(path)
     if kind not in (".3mf", ".dae"):
         return {".glb": "m", ".gltf": "m", ".step": "mm", ".stp": "mm"}.get(kind)
@@ -107,7 +115,7 @@ def unit_of(path: PathLike) -> str | None:
 
 
 def _collada_unit(data: bytes) -> str | None:
-    """Return the unit in the first ``<asset>`` of a COLLADA file: any name may stand beside its length in metres."""
+    """Return the unit of `METRES` that has the length given in the first ``<asset>`` of a COLLADA file, or None."""
     charge_tree(data, XML)
     for _, element in ElementTree.iterparse(io.BytesIO(data)):
         if element.tag.endswith("}unit"):
@@ -122,9 +130,17 @@ def _collada_unit(data: bytes) -> str | None:
 
 
 def scale_to(path: PathLike, units: str) -> float:
-    """Return the factor to TO from the unit of a file, or FROM if it states none; `units` are ``TO`` or ``FROM:TO``."""
-    assumed, _, wanted = units.rpartition(":")
-    return METRES[unit_of(path) or assumed or wanted] / METRES[wanted]
+    """Return the factor by which coordinates of a file are multiplied to convert them to another unit.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    units : str
+        The other unit, such as ``"mm"``, or ``"inch:mm"`` with the unit to assume for a file that states none.
+    """
+    assumed, _, target = units.rpartition(":")
+    return METRES[unit_of(path) or assumed or target] / METRES[target]
 
 
 class _Package:
@@ -147,7 +163,7 @@ class _Package:
         return MODEL_PART
 
     def model(self, part: str) -> ElementTree.Element:
-        """Return the root element of a part."""
+        """Return the root of the XML tree of a part."""
         if part not in self._models:
             self._models[part] = ElementTree.fromstring(self._bytes(part))
         return self._models[part]
@@ -155,17 +171,29 @@ class _Package:
     def object(self, key: Key) -> _Object:
         """Return an object, by part and id."""
         if key not in self._objects:
-            part, wanted = key
+            part, number = key
             for element in _all(self.model(part), "object"):
                 self._objects[part, element.get("id", "")] = _object(element, part)
             if key not in self._objects:
-                raise damaged(f"object {wanted} does not exist", element=f"object {wanted}")
+                raise damaged(f"object {number} does not exist", element=f"object {number}")
         return self._objects[key]
 
     def charge(self, keys: Sequence[Key], depth: int = 0) -> tuple[int, int]:
-        """Charge objects that are about to be placed together; return their size and the levels of their components.
+        """Charge the memory of objects that are about to be joined, with their components, to the budget of the file.
 
-        What components are made of is charged once, as `body` makes it.
+        Parameters
+        ----------
+        keys : sequence of (part, id)
+            The objects. Components of several objects are made, and charged, once (see `body`).
+        depth : int
+            How many objects contain these.
+
+        Returns
+        -------
+        made : int
+            The number of vertices plus faces of all objects.
+        height : int
+            The largest number of levels of nested components.
         """
         made, height = 0, 0
         for key in keys:
@@ -185,7 +213,7 @@ class _Package:
     def body(self, key: Key) -> Body:
         """Return the vertices and faces of an object with all its components, without those that have no faces.
 
-        Each object is made once, so that the work is that of the result, also where each level names another one twice.
+        Each object is made once and then copied, so that the work is no more than the size of the result.
         """
         if key not in self._bodies:
             item = self.object(key)
@@ -196,7 +224,7 @@ class _Package:
         return self._bodies[key]
 
     def _bytes(self, part: str) -> bytes:
-        """Return the bytes of a part; no more are unpacked than the archive announces."""
+        """Return the XML text of a part; no more is unpacked than the archive announces."""
         entry = self._zip.getinfo(part)
         charge(bytes=entry.file_size)
         with self._zip.open(entry) as file:
@@ -208,22 +236,29 @@ class _Package:
 
 
 def _all(element: ElementTree.Element, name: str) -> Iterator[ElementTree.Element]:
-    """Return the elements of a name within an element, in any namespace."""
-    return (each for each in element.iter() if each.tag.rpartition("}")[2] == name)
+    """Return the element itself and all elements within it that have a name, in any namespace."""
+    return (inner for inner in element.iter() if inner.tag.rpartition("}")[2] == name)
 
 
 def _part(target: str) -> str:
+    """Return the name of a part in the archive, given as an absolute path in the package."""
     return posixpath.normpath(target.lstrip("/"))
 
 
 def _key(element: ElementTree.Element, part: str, name: str = "objectid") -> Key:
-    """Return the object that an element names; with the production extension it may lie in another part."""
+    """Return the part and id of the object that an element of `part` names by its attribute `name`.
+
+    With 3MF's production extension the object may lie in another part.
+    """
     path = element.get(PATH)
     return part if path is None else _part(path), element.get(name, "")
 
 
 def _matrix(element: ElementTree.Element) -> Floats:
-    """Return the (4, 3) transform of rows that an element states, by default the identity."""
+    """Return the (4, 3) transform that an element states, by default the identity.
+
+    Rows (x, y, z, 1) are multiplied by it from the right.
+    """
     words = element.get("transform")
     if words is None:
         return np.eye(4, 3)
@@ -254,12 +289,13 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     path : str or path
         The file.
     deflection : float, optional
-        How far triangles may be off curved faces, in millimetres: by default a thousandth of the diagonal.
+        How far triangles may be off curved faces, in millimetres; by default a thousandth of the diagonal of the box
+        around the shape.
 
     Returns
     -------
     mesh : TriangleMesh
-        In millimetres, whatever the units of the file; its faces face outwards, as those of the CAD solid.
+        The triangles in millimetres, whatever the units of the file. They face outwards where the CAD faces do.
     cad_faces : (m,) int
         The number of the CAD face of each triangle; faces are numbered from 0 in the order of the file.
 
@@ -288,8 +324,8 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     starts = np.cumsum([0, *parts["point_counts"][:-1]])
     faces = parts["triangles"] + np.repeat(starts, counts)[:, None]
     # corners of neighbouring faces that agree within the precision of Open CASCADE become one vertex
-    kept, numbers = np.unique(welded(parts["points"], 1e-6 * parts["diagonal"]), return_inverse=True)
-    return TriangleMesh(parts["points"][kept], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
+    rows, numbers = np.unique(welded(parts["points"], 1e-6 * parts["diagonal"]), return_inverse=True)
+    return TriangleMesh(parts["points"][rows], numbers.ravel()[faces]), np.repeat(np.arange(len(counts)), counts)
 
 
 def step_mesh(path: PathLike) -> TriangleMesh:

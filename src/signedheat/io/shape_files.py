@@ -35,7 +35,7 @@ from .vtk_xml import read_vtp, write_vtp
 
 
 def read_archive(path: PathLike) -> Solid | TriangleMesh:
-    """Return the solid in a NumPy archive, or that of the field in it, or the zero level set of a field without one."""
+    """Read a solid from a NumPy archive, or from a field its solid, or else the zero level set of the field."""
     if holds_solid(path):
         return read_solid(path)
     field = read_field(path)
@@ -82,17 +82,20 @@ WRITERS: dict[str, Callable[[Elements, PathLike], bytes]] = {
 SHAPE_FORMATS = frozenset(WRITERS)
 
 CHECKED_FACES = 100_000
-"""Number of faces from which on `read` checks that there is memory to work with them."""
+"""Number of faces from which on `read` checks that memory suffices for computations with them."""
 
 
 def read(path: PathLike) -> Shape | Solid:
     """Read a shape, in the format given by the extension.
 
-    STL, OBJ, PLY, OFF, VTP, GLB, DAE, 3MF and STEP files have surfaces; XYZ, PCD, LAS, LAZ, E57 and PC files have
-    points, and so have PLY, OBJ, OFF and VTP files without faces. Vertices and faces keep their number and order,
-    whatever their defects: nothing is merged, dropped, split or flipped. STL has no vertices; corners with exactly the
-    same coordinates become one. NPY, NRRD and VTI files have volumes of voxels, booleans or zeros and ones. MESH, MSH,
-    VTU, VTK and TetGen's NODE with ELE have tets. NPZ files have solids, or fields that hold them.
+    - Surfaces: STL, OBJ, PLY, OFF, VTP, GLB, DAE, 3MF and STEP files.
+    - Points: XYZ, PCD, LAS, LAZ, E57 and PC files, and PLY, OBJ, OFF and VTP files without faces.
+    - Volumes of voxels, which are booleans or zeros and ones: NPY, NRRD and VTI files.
+    - Tets: MESH, MSH, VTU, VTK and TetGen's NODE with ELE.
+    - Solids, or fields that have them: NPZ files.
+
+    Vertices and faces keep their number and order, whatever their defects: nothing is merged, dropped, split or
+    flipped. Since STL has no vertices, its corners with exactly the same coordinates become one vertex.
 
     Parameters
     ----------
@@ -102,15 +105,15 @@ def read(path: PathLike) -> Shape | Solid:
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
-        A triangle mesh if all faces are triangles, otherwise a polygon mesh, and a point cloud if there is no face. Of
-        other files, the boundary of a volume of voxels, a tet mesh, or a solid.
+        A triangle mesh if all faces are triangles, a polygon mesh if others are, and a point cloud without faces. A
+        volume of voxels becomes its boundary, a `DigitalSurface`.
 
     Raises
     ------
     FileFormatError
         If the file is missing, of unknown format, truncated or damaged.
     MemoryLimitError
-        If too little memory is free for so large a file, or to do anything with so many faces.
+        If too little memory is free to read the file, or to compute anything with so many faces.
     GeometryError
         If the shape is invalid: no element, NaN or infinite coordinates, a vertex id that does not exist.
 
@@ -205,6 +208,7 @@ def save(shape: Shape | ForeignShape, path: PathLike) -> None:
 
 
 SOLID_FORMATS = SAMPLE_FORMATS = frozenset({".npz"})
+"""Formats that hold a solid itself, not only its surface; and those of samples."""
 
 
 def save_solid(solid: Solid, path: PathLike) -> None:

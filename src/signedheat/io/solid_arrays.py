@@ -19,9 +19,11 @@ from .files import PathLike, reading
 from .numpy_files import names_in_npz, read_npz
 
 SOLID_ARRAYS = ("triangles", "origins", "confidence", "bounding", "closing", "key")
+"""Names of the arrays that each solid has in an archive."""
 SOURCE_ARRAYS = ("source_vertices", "source_faces")
+"""Names of the arrays of the shape that was completed to a solid, if the solid has it."""
 ARCHIVE_VERSION = 2
-"""Version of the archive. Other versions are refused."""
+"""Version of the format of archives. Archives of other versions are refused."""
 
 
 def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
@@ -39,7 +41,7 @@ def arrays_of(solid: Solid) -> dict[str, NDArray[Any]]:
 
 
 def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
-    """Return the solid of which `arrays_of` returned these arrays, which are checked; it has no notes."""
+    """Make the solid from which `arrays_of` made these arrays, without diagnostics. Damaged arrays are refused."""
     triangles, closing, origins = arrays["triangles"], arrays["closing"], arrays["origins"]
     confidence, bounding, n = arrays["confidence"], arrays["bounding"], len(triangles) if triangles.ndim else 0
     kinds = (triangles, "f", (n, 3, 3)), (closing, "f", (len(closing) if closing.ndim else 0, 3, 3))
@@ -75,12 +77,12 @@ def solid_of(arrays: Mapping[str, NDArray[Any]]) -> Solid:
 
 
 def holds_solid(path: PathLike) -> bool:
-    """Whether an archive is that of a solid."""
+    """Whether a NumPy archive holds a solid, not a field."""
     return "solid_version" in names_in_npz(path)
 
 
 def read_solid(path: PathLike) -> Solid:
-    """Read a solid that `Solid.save` has written: distances are the same to the last bit.
+    """Read a solid that `Solid.save` has written, with the same distances to the last bit.
 
     Parameters
     ----------
@@ -90,7 +92,7 @@ def read_solid(path: PathLike) -> Solid:
     Returns
     -------
     Solid
-        Its diagnostics are empty.
+        The solid, with empty diagnostics.
 
     Raises
     ------
@@ -129,4 +131,5 @@ def _key(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
 
 
 def _damaged(cause: str) -> FileFormatError:
+    """Return the error for arrays that are not those of a solid."""
     return FileFormatError(cause, remedy="write the solid again", element="solid")

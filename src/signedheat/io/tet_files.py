@@ -43,15 +43,15 @@ TET_FORMATS = frozenset(MESHIO_MODULES)
 
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
-"""Sections of Gmsh files, and the number of counts at the beginning of each (one in version 2)."""
+"""Number of counts at the beginning of each section of a Gmsh file, by its name (one in version 2)."""
 LONGEST_LINE = 200
-"""Bytes of a line with counts, at most."""
+"""Bytes of a line in which counts are looked for."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
-"""Sections that begin with text even in binary files."""
+"""Sections of Gmsh files whose counts are text even in binary files."""
 
 
 def read_tets(path: PathLike) -> TetMesh | TriangleMesh | PolygonMesh:
-    """Read a `TetMesh`; or, from a file without tets, its surface."""
+    """Read a tet mesh, or from a file with nothing but flat cells, which include triangles or quads, a mesh."""
     mesh = load_cells(path)
     kinds = {block.type for block in mesh.cells}
     if not kinds & {"triangle", "quad"} or not all(kind.startswith(FLAT_CELLS) for kind in kinds):
@@ -87,7 +87,7 @@ def store_cells(mesh: Any, path: PathLike) -> None:
 
 
 def _files(path: PathLike) -> list[Path]:
-    """Return the named file, preceded by the other file of a pair."""
+    """Return the files to read for a path: for TetGen the other file of the pair and this one, otherwise this one."""
     named = Path(path)
     return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
 

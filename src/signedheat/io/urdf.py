@@ -12,12 +12,13 @@ from .files import PathLike, contents, reading
 from .numerals import parsed_numbers
 
 Scale = tuple[float, float, float]
+"""Factors along x, y and z."""
 
 
 def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
-    """Return the files of all meshes of a robot, each once with every scale along its axes, in order.
+    """Return the files and scales of all meshes in the description of a robot, without repetitions, in its order.
 
-    Names that begin with ``package://`` are looked for below the folder of the description and those above it.
+    Names that begin with ``package://`` are searched in the folder of the description and in those that contain it.
     """
     with reading(path):
         data = contents(path)
@@ -28,7 +29,7 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
             raise FileFormatError(f"it is no XML ({error})", remedy="expand macros first: xacro robot.xacro") from error
         if root.tag != "robot":
             raise FileFormatError(f"its root is <{root.tag:.40}>, not <robot>", remedy="name a URDF file")
-        found: dict[tuple[Path, Scale], None] = {}
+        meshes: dict[tuple[Path, Scale], None] = {}
         for mesh in root.iter("mesh"):
             name = mesh.get("filename", "")
             scale = parsed_numbers(mesh.get("scale", "1 1 1").split(), "a scale")
@@ -38,14 +39,17 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
                     remedy="give a name, and three numbers that are not 0",
                 )
             x, y, z = map(float, scale)
-            found[_located(Path(path), name), (x, y, z)] = None
-        if not found:
+            meshes[_path_of_mesh(Path(path), name), (x, y, z)] = None
+        if not meshes:
             raise FileFormatError("it refers to no mesh", remedy="name the meshes themselves")
-    return list(found)
+    return list(meshes)
 
 
-def _located(robot: Path, name: str) -> Path:
-    """Return the path of a mesh that a robot names; the path beside the robot if there is no such file."""
+def _path_of_mesh(robot: Path, name: str) -> Path:
+    """Return the path of a mesh that the description of a robot names.
+
+    If there is no such file, it is a path relative to the folder of the description.
+    """
     scheme, separator, rest = name.partition("://")
     if scheme == "file" and separator:
         return Path(rest)
@@ -55,5 +59,5 @@ def _located(robot: Path, name: str) -> Path:
     parts = Path(inner).parts
     names = [inner] if not separator else [inner, os.path.join(*parts[1:])] if len(parts) > 1 else [inner]
     folders = [robot.absolute().parent, *(robot.absolute().parents if separator else ())]
-    places = [folder / each for folder in folders for each in names]
-    return next((place for place in places if place.is_file()), places[0])
+    paths = [folder / relative for folder in folders for relative in names]
+    return next((path for path in paths if path.is_file()), paths[0])

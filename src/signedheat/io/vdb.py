@@ -31,13 +31,14 @@ VDB_MAGIC, VDB_VERSION, VDB_LIBRARY = 0x56444220, 224, (10, 0)
 ZIP_FLAG, ALL_VALUES_BYTE = 1, 6
 """Flag of values packed by zlib; byte before values that says that all of them are there."""
 MOST_HALF = float(np.finfo(np.float16).max)
+"""Largest number of 16 bits. Fields with larger values are not written with `half`."""
 CHILDREN_PER_EDGE, VOXELS_PER_CHILD = (32, 16), (128, BLOCK)
-"""Nodes above the blocks, from the top: children along each edge, and voxels along each edge of a child."""
+"""Numbers for top nodes and for cubes: children along each edge of a node, and voxels along each edge of a child."""
 VDB_CONVENTION = (
     "signed distance, negative inside, in the units of the shape; voxel (i, j, k) at origin + (i, j, k) * spacing"
 )
 Outside = Callable[[Ints, int], NDArray[np.float32]]
-"""Returns values of cubes outside the blocks, given their first voxels and the number of voxels along each edge."""
+"""Function that returns (k,) values of cubes without voxels, given (k, 3) first voxels and voxels along each edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,16 +47,17 @@ class _Tree:
 
     background: np.float32  # value of voxels that the tree does not contain
     places: Ints  # (n, 3) first voxels of the blocks, in the order of the file
-    values: NDArray[np.floating]  # (n, 8, 8, 8) each: values of their voxels, and which of these are active
-    active: Bools
-    outside: Outside  # values where there are no blocks
+    values: NDArray[np.floating]  # (n, 8, 8, 8) values of the voxels of the blocks
+    active: Bools  # (n, 8, 8, 8) which voxels have a distance
+    outside: Outside  # values of nodes where there are no blocks
 
 
 def write_vdb(field: Field[Grid], path: PathLike, half: bool = False) -> None:
     """Write a field in space as a ``.vdb`` file, single precision, without OpenVDB.
 
-    A field in a band becomes a level set: voxels up to its half width are active, and the others have plus or minus
-    that value. Of a field on a grid all nodes are active. Such files are not read back: keep a ``.npz``.
+    A field in a band becomes a level set. Its voxels up to the half width of the band are active, and the others have
+    plus or minus that value. All nodes of a field on a grid are active. Keep a ``.npz`` too, since `read_field` does
+    not read such files.
 
     Parameters
     ----------
@@ -110,7 +112,7 @@ def write_vdb(field: Field[Grid], path: PathLike, half: bool = False) -> None:
 
 
 def _band(field: Field[Band]) -> _Tree:
-    """Return the tree of a band; outside the blocks, values are the background with the sign of the coarse field."""
+    """Return the tree of a field in a band. Outside the blocks, values are plus or minus the half width of the band."""
     grid, background = field.domain, np.float32(field.domain.width)
     finite = ~np.isnan(field.values)
     values = np.where(finite, np.clip(field.values, -background, background), background)
@@ -128,7 +130,7 @@ def _band(field: Field[Band]) -> _Tree:
 
 
 def _whole(field: Field[Grid]) -> _Tree:
-    """Return the tree of all nodes of a grid; nodes without a value, and padding of the last blocks, are inactive."""
+    """Return the tree of a field at all nodes of its grid. Nodes without a value and padding of blocks are inactive."""
     shape = field.domain.shape
     counts = -(-np.array(shape) // BLOCK)
     background = np.nextafter(np.float32(np.nanmax(field.values)), np.float32(np.inf))
@@ -149,7 +151,10 @@ def _whole(field: Field[Grid]) -> _Tree:
 def _in_order(
     blocks: Blocks, values: NDArray[np.floating], active: Bools, background: np.float32, outside: Outside
 ) -> _Tree:
-    """Return the tree with its blocks in the order of the file: by top node, by cube, by place."""
+    """Return the tree with its blocks in the order of the file, which is by top node, then by cube, then by position.
+
+    Values and activity are (n, 8, 8, 8) arrays in the order of `blocks`.
+    """
     places = BLOCK * blocks.places.astype(np.int64)
     top, cube = CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0], VOXELS_PER_CHILD[0]
     order = np.lexsort(np.concatenate([places // top, places // cube, places], axis=1).T[::-1])
@@ -159,7 +164,10 @@ def _in_order(
 def _write_file(
     file: BinaryIO, tree: _Tree, metadata: dict[str, str | bool], origin: Floats, spacing: Floats, half: bool
 ) -> None:
-    """Write the header, the offsets of the grid, of its voxels and of its end, and the grid."""
+    """Write a file: the header, the offsets of the grid, of its voxels and of its end, and the grid.
+
+    `origin` is the position of voxel (0, 0, 0). Voxels lie `spacing` apart. Values have 16 bits if `half`, else 32.
+    """
     kind = np.dtype("<f2" if half else "<f4")
     file.write(struct.pack("<qIIIB", VDB_MAGIC, VDB_VERSION, *VDB_LIBRARY, 1) + str(uuid.uuid4()).encode())
     file.write(struct.pack("<II", 0, 1))  # numbers of metadata of the file, and of grids
@@ -179,7 +187,7 @@ def _write_file(
 
 
 def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
-    """Write the nodes from the root down: which places have children, the values of the others, masks of blocks."""
+    """Write the nodes from the root down, with values of type `kind`, and the masks of active voxels of the blocks."""
     cube, top_size = VOXELS_PER_CHILD[0], CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0]
     cubes_of = _by_parent(tree.places // cube * cube, top_size)
     blocks_of = _by_parent(tree.places, cube)
@@ -195,7 +203,21 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
 
 
 def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
-    """Return a node: masks of its cubes that have children and that are active (none), and values, 0 at children."""
+    """Return a node as bytes: masks of cubes that have children and that are active (none), and values of the cubes.
+
+    Parameters
+    ----------
+    place : (3,) int
+        The first voxel of the node.
+    level : int
+        0 for a top node, whose children are cubes of blocks, and 1 for such a cube, whose children are blocks.
+    children : (k, 3) int
+        The first voxels of its children.
+    outside : callable
+        Values of cubes that have no children; the others get 0.
+    kind : dtype
+        The type of the values in the file.
+    """
     size, shape = VOXELS_PER_CHILD[level], (CHILDREN_PER_EDGE[level],) * 3
     cubes = place + size * np.indices(shape).reshape(3, -1).T
     has_child = np.zeros(shape, dtype=bool)
@@ -205,14 +227,14 @@ def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dt
 
 
 def _transform(origin: Floats, step: Floats) -> bytes:
-    """Return translation, scale, voxel size, and what the library keeps of the scale's inverse."""
+    """Return the map from voxels to positions as bytes, with powers of the inverse scale, as OpenVDB stores them."""
     uniform = "Uniform" if bool((step == step[0]).all()) else ""
     rows = np.concatenate([origin, step, step, 1 / step, 1 / step**2, 0.5 / step])
     return _text(f"{uniform}ScaleTranslateMap") + rows.astype("<f8").tobytes()
 
 
 def _metadata(metadata: dict[str, str | bool]) -> bytes:
-    """Return named values with their types."""
+    """Return the number of named values, and each with its name, type and length, as bytes."""
     result = struct.pack("<I", len(metadata))
     for name, value in metadata.items():
         data = value.encode() if isinstance(value, str) else bytes([value])
@@ -222,7 +244,7 @@ def _metadata(metadata: dict[str, str | bool]) -> bytes:
 
 
 def _text(given: str) -> bytes:
-    """Return a string after its length."""
+    """Return the length of a string in bytes, followed by the string in UTF-8."""
     return struct.pack("<I", len(given.encode())) + given.encode()
 
 
@@ -232,7 +254,10 @@ def _mask(chosen: Bools) -> bytes:
 
 
 def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
-    """Return values, packed by zlib if that is shorter, after their number of bytes, which is negative otherwise."""
+    """Return the size of values in bytes and the values of type `kind`, packed by zlib if that is shorter.
+
+    The size is negative if they are not packed.
+    """
     data = values.astype(kind).tobytes()
     packed = zlib.compress(data, 1)
     is_shorter = len(packed) < len(data)
@@ -241,7 +266,10 @@ def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
 
 
 def _by_parent(places: Ints, size: int) -> dict[tuple[int, ...], Ints]:
-    """Return the distinct places of nodes, sorted, by the place of their parent, `size` voxels along each edge."""
+    """Return the sorted distinct first voxels of nodes, (k, 3), by the first voxel of their parent.
+
+    Parents have `size` voxels along each edge.
+    """
     nodes = np.unique(places, axis=0)
     parents, rows = np.unique(nodes // size * size, axis=0, return_inverse=True)
     order = np.argsort(rows.ravel(), kind="stable")

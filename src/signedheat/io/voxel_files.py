@@ -31,34 +31,34 @@ Mesh = TypeVar("Mesh", TriangleMesh, PolygonMesh)
 VOLUME_FORMATS = (".npy", ".nrrd", ".vti")
 LABEL_FORMATS = (*VOLUME_FORMATS, *NIFTI)
 BYTES_PER_READ_VOXEL = 12
-"""Memory for a voxel while the boundary of a volume is found: measured."""
+"""Memory for each voxel while the boundary of a volume is computed, as measured."""
 SPACES = {
     "right-anterior-superior": (1, 1, 1),
     "left-posterior-superior": (-1, -1, 1),
     "left-anterior-superior": (-1, 1, 1),
 }
-"""Signs that turn the axes of a space, as NRRD files name it, into those of NIfTI files."""
+"""Signs of the axes of a space, as NRRD files name it, in the coordinates of NIfTI files."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LabelImage(Represented, Frozen):
-    """Labels of voxels, and where these are.
+    """An image of voxels with labels, and its position in the world.
 
-    An image with zeros and one other label can be given wherever a shape can, and stands for its `boundary` in the
-    world. For others, distance is measured along the axes of the image (`grid`, `surface`), and results are written
-    with its position in the world (`save`, `to_world`). That does not change distances, as the axes are at right
-    angles.
+    The axes of the image may be rotated or mirrored in the world. An image with zeros and one other label can be given
+    wherever a shape can, and stands for its `boundary` in the world. With more labels, distance to the `surface` of a
+    label is measured on the `grid` along the axes of the image, and the results are written with their position in the
+    world (`save`, `to_world`). Distances are the same in both, as the axes are at right angles.
 
     Attributes
     ----------
     labels : (nx, ny, nz) number
-        One for each voxel.
+        The label of each voxel.
     axes : (3, 3) float
         The step from one voxel to the next along each axis of the image, in columns.
     origin : (3,) float
-        Centre of the first voxel.
+        The centre of the first voxel in the world.
     space : str, optional
-        What the axes of the world are, as in NRRD files: ``"left-posterior-superior"``.
+        The meaning of the axes of the world, as in NRRD files, such as ``"left-posterior-superior"``.
 
     Raises
     ------
@@ -124,12 +124,12 @@ class LabelImage(Represented, Frozen):
 
     @property
     def grid(self) -> Grid:
-        """The grid of the centres of the voxels, along the axes of the image; the first one is at 0."""
+        """The grid of the centres of the voxels, along the axes of the image, with the first voxel at 0."""
         return Grid((0.0, 0.0, 0.0), self.spacing, self.labels.shape)
 
     @property
     def matrix(self) -> Floats:
-        """(4, 4) map from positions along the axes of the image to those in the world."""
+        """(4, 4) matrix that maps positions (x, y, z, 1) along the axes of the image to positions in the world."""
         matrix = np.eye(4)
         matrix[:3, :3], matrix[:3, 3] = self.axes / self.spacing, self.origin
         return matrix
@@ -140,22 +140,22 @@ class LabelImage(Represented, Frozen):
         return self.to_world(self.surface())
 
     def surface(self, label: float | None = None) -> TriangleMesh:
-        """Return the smooth surface around the voxels with a label, along the axes of the image: closed and manifold.
+        """Return the smooth surface around the voxels with a label, in coordinates along the axes of the image.
 
         Parameters
         ----------
         label : number, optional
-            The label; may be left out where the image has zeros and one other label.
+            The label, which may be left out if the image has zeros and one other label.
 
         Returns
         -------
         TriangleMesh
-            Closed and manifold.
+            A closed and manifold mesh.
 
         Raises
         ------
         GeometryError
-            If no voxel has it, or it is left out and there are several.
+            If no voxel has the label, or none is given and the image has several.
 
         See Also
         --------
@@ -191,12 +191,12 @@ class LabelImage(Represented, Frozen):
         Parameters
         ----------
         surface : TriangleMesh or PolygonMesh
-            As `surface` returns it.
+            The mesh, such as `surface` returns.
 
         Returns
         -------
         TriangleMesh or PolygonMesh
-            In the world.
+            The mesh in the world.
 
         See Also
         --------
@@ -216,11 +216,10 @@ class LabelImage(Represented, Frozen):
         Parameters
         ----------
         field : Field
-            On a grid or in a band.
-            On `grid`, or another one along the same axes.
+            The field on `grid`, or on another grid or band along the axes of the image.
         path : str or path
-            ``.nrrd`` or ``.nii`` or ``.nii.gz`` (with nibabel); other formats of fields where the axes of the image are
-            those of the world.
+            A ``.nrrd`` file, or with nibabel a ``.nii`` or ``.nii.gz`` file. If the axes of the image are those of the
+            world, it may have any other format of fields on grids.
 
         Raises
         ------
@@ -254,12 +253,12 @@ class LabelImage(Represented, Frozen):
             save_field(replace(field, domain=Grid(first, field.domain.spacing, field.domain.shape), solid=None), path)
 
     def ensure_writable(self, path: PathLike) -> None:
-        """Check before a long computation that a field can be written with the position of the image.
+        """Raise an error if a field cannot be written by `save`, before a long computation.
 
         Parameters
         ----------
         path : str or path
-            As for `save`.
+            The file, in a format that `save` supports.
 
         Raises
         ------
@@ -296,6 +295,10 @@ class LabelImage(Represented, Frozen):
         return f"LabelImage({voxels} voxels of {short(self.spacing)}, {_listed(np.unique(self.labels))})"
 
     def _nifti(self, field: Field[Grid], axes: Floats, first: Floats, path: PathLike) -> bytes:
+        """Return a NIfTI file, packed if the name of `path` says so.
+
+        `axes` are the (3, 3) steps from node to node, in columns, and `first` is the position of the first node.
+        """
         affine = np.eye(4)
         affine[:3, :3], affine[:3, 3] = axes, first
         signs = SPACES[self.space] if self.space is not None else (1, 1, 1)
@@ -305,17 +308,18 @@ class LabelImage(Represented, Frozen):
 
 
 def read_labels(path: PathLike) -> LabelImage:
-    """Read an image of labels, as segmentation makes them, with its position in the world.
+    """Read an image of labels, such as a segmentation, with its position in the world.
 
     Parameters
     ----------
     path : str or path
-        ``.nrrd``, ``.nii`` or ``.nii.gz`` (with nibabel), ``.vti``, ``.npy``. Axes may be rotated and mirrored.
+        A ``.nrrd``, ``.vti`` or ``.npy`` file, or with nibabel a ``.nii`` or ``.nii.gz`` file. The axes of the image
+        may be rotated and mirrored.
 
     Returns
     -------
     LabelImage
-        Labels, and their position in the world.
+        The labels and their position in the world.
 
     Raises
     ------
@@ -349,16 +353,17 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     Parameters
     ----------
     path : str or path
-        ``.npy`` (voxels of size 1, or with origin and spacing in a ``.json`` of the same name), ``.nrrd`` or ``.vti``.
+        A ``.nrrd``, ``.vti`` or ``.npy`` file. Origin and spacing of the latter are read from a ``.json`` file of the
+        same name, or without it are 0 and 1.
     level : float, optional
-        Voxels with larger values are inside. Without it the image must have booleans, or zeros and ones.
+        Voxels with values above it are inside. If it is not given, the image must have booleans, or zeros and ones.
     radius : float, optional
-        Radius within which normals are estimated, as for `DigitalSurface`.
+        Radius within which normals are estimated, in the units of the file, as for `DigitalSurface`.
 
     Returns
     -------
     DigitalSurface
-        The boundary of the voxels, in the units of the file.
+        The boundary of the voxels that are inside, in the units of the file.
 
     Raises
     ------
@@ -390,5 +395,6 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
 
 
 def _listed(labels: NDArray[Any]) -> str:
+    """Return words that list (k,) labels, at most twelve of them."""
     values = ", ".join(f"{label:g}" for label in labels[:12].tolist())
     return f"the label{'s' if len(labels) > 1 else ''} {values}{', …' if len(labels) > 12 else ''}"

@@ -28,7 +28,9 @@ from .numerals import integer, integers, parsed_numbers
 
 VTK_TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
 VTK_TYPES |= {"Float32": "f4", "Float64": "f8"}
+"""NumPy types by the names of types in VTK's files."""
 VTK_NAMES = {code: name for name, code in VTK_TYPES.items()}
+"""Names of types in VTK's files by NumPy types."""
 CELL_NAMES = {
     1: "vertex",
     3: "line",
@@ -41,11 +43,21 @@ CELL_NAMES = {
     14: "pyramid",
     24: "tetra10",
 }
-"""Names in meshio of VTK's types of cells."""
+"""Names of the kinds of cells in meshio, by their numbers in VTK."""
 
 
 def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]], convention: str) -> bytes:
-    """Return a ``.vti`` file of up to three axes; a missing axis has one node. ParaView shows the first values."""
+    """Return a ``.vti`` file as bytes.
+
+    Parameters
+    ----------
+    origin, spacing : (d,) float
+        Position of the first node, and steps along each axis.
+    values : mapping of (n₁, …, n_d) arrays
+        Values at the nodes by name, indexed [x, y, z]. ParaView shows the first.
+    convention : str
+        What the values mean, which becomes a comment.
+    """
     name, first = next(iter(values.items()))
     missing = 3 - first.ndim
     extent = " ".join(f"0 {n - 1}" for n in first.shape + (1,) * missing)
@@ -64,7 +76,24 @@ def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]
 
 
 def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Floats, NDArray[Any] | None]:
-    """Read the array that the file says to show, or else the first; origin; spacing; and the array `other`, if any."""
+    """Read values at the nodes of an image along x, y, z.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    other : str
+        Name of a further array to read.
+
+    Returns
+    -------
+    values : (n₁, …, n_d) array
+        The array that the file says to show, or else the first, indexed [x, y, z].
+    origin, spacing : (d,) float
+        Position of the first node, and steps along each axis.
+    further : (n₁, …, n_d) array or None
+        The array named `other`, or None if there is none.
+    """
     root, arrays = parse(path, "ImageData")
     image, piece = root.find("ImageData"), root.find("ImageData/Piece")
     extent = integers(image.get("WholeExtent", "").split() if image is not None else [], "extent")
@@ -92,8 +121,8 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
     if nodes is None or not listed:
         raise FileFormatError("there are no values at the nodes", remedy="save them as point data")
     images = []
-    shown = next((each for each in listed if each.get("Name") == nodes.get("Scalars")), listed[0])
-    for element in [shown, *(each for each in listed if each is not shown and each.get("Name") == other)][:2]:
+    first = next((array for array in listed if array.get("Name") == nodes.get("Scalars")), listed[0])
+    for element in [first, *(array for array in listed if array is not first and array.get("Name") == other)][:2]:
         if element.get("NumberOfComponents", "1") not in ("1", ""):
             raise FileFormatError(
                 f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
@@ -104,7 +133,7 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
 
 
 def write_vtp(shape: Elements, path: PathLike) -> bytes:
-    """Return a ``.vtp`` file of polygons, or of points with normals and areas; ParaView shows the first values."""
+    """Return a ``.vtp`` file of polygons, or of points with normals and areas. ParaView shows the first of `values`."""
     points, corners, counts = shape.points, shape.corners, shape.counts
     given = {"Normals": shape.normals, "area": shape.areas, **shape.values}
     group = "Polys" if len(counts) else "Verts"
@@ -124,7 +153,10 @@ def write_vtp(shape: Elements, path: PathLike) -> bytes:
 
 
 def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
-    """Read the polygons of all pieces, or else the points, with values by `names` where all pieces have them."""
+    """Read the polygons of a ``.vtp`` file, or if it has none its points.
+
+    `names` are values at the points to read; those that a part of the file lacks are left out.
+    """
     root, arrays = parse(path, "PolyData")
     pieces = root.findall("PolyData/Piece")
     made = sum(arrays.count(piece, name) for piece in pieces for name in ("NumberOfPoints", "NumberOfPolys"))
@@ -169,10 +201,10 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
 
 @dataclass(frozen=True)
 class Block:
-    """Cells of one kind, as rows of point ids."""
+    """Cells of the same kind."""
 
-    type: str
-    data: Ints
+    type: str  # name of the kind in meshio, such as "tetra"
+    data: Ints  # (m, k) ids of the k points of each cell
 
 
 @dataclass(frozen=True)
@@ -185,7 +217,7 @@ class Cells:
 
 
 def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
-    """Read points, cells, and the point data whose names are given."""
+    """Read the points and cells of a ``.vtu`` file, and those values at the points that have the given names."""
     root, arrays = parse(path, "UnstructuredGrid")
     pieces = root.findall("UnstructuredGrid/Piece")
     if len(pieces) != 1:
@@ -221,13 +253,14 @@ def read_vtu(path: PathLike, names: tuple[str, ...] = ()) -> Cells:
 
 
 def pairs_of(first: Ints, second: Ints) -> list[Ints]:
-    """Return the indices at which both numbers are the same, in ascending order of the numbers."""
+    """Return the indices of entries that have the same pair of numbers, for each pair in ascending order."""
     order = np.lexsort([second, first])
     changes = (np.diff(first[order]) != 0) | (np.diff(second[order]) != 0)
     return np.split(order, np.flatnonzero(changes) + 1) if len(order) else []
 
 
 def _words(values: Any) -> str:
+    """Write numbers as text that is read back exactly, with spaces between them."""
     return " ".join(repr(float(value)) for value in values)
 
 
@@ -252,7 +285,7 @@ class _Writer:
         return element
 
     def file(self, kind: str, body: str) -> bytes:
-        """Return the whole file."""
+        """Return the bytes of a file of a kind, such as ``"ImageData"``, with its XML and the data of all arrays."""
         about = f'type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
         head = f'<?xml version="1.0"?>\n<VTKFile {about}>\n'
         appended = '\n<AppendedData encoding="raw">_'
@@ -261,20 +294,20 @@ class _Writer:
 
 @dataclass(frozen=True)
 class _Arrays:
-    """Decodes the arrays of one file."""
+    """Decodes the arrays of a file."""
 
-    order: str
-    header: np.dtype[Any]
-    compressor: str | None
-    encoding: str
-    appended: bytes
+    order: str  # byte order of the numbers in NumPy's notation, "<" or ">"
+    header: np.dtype[Any]  # type of the sizes before the data of an array
+    compressor: str | None  # name of the compression in VTK, or None if data are not compressed
+    encoding: str  # of the appended section, "raw" or "base64"
+    appended: bytes  # the appended section, which has the data of arrays
 
     def count(self, piece: ElementTree.Element, name: str) -> int:
-        """Return a count that a piece announces, 0 by default."""
+        """Return a number such as ``NumberOfPoints`` that a part of the file announces, 0 by default."""
         return integer(piece.get(name, "0").strip(), name)
 
     def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
-        """Return the `count` numbers of a DataArray element; no more are unpacked."""
+        """Return the (count,) numbers of a DataArray element, and raise an error if there are more or fewer."""
         if element is None:
             return self._counted(np.empty(0), count)
         code = VTK_TYPES.get(element.get("type", ""))
@@ -302,6 +335,7 @@ class _Arrays:
         return self._counted(values, count).astype(code, copy=False)
 
     def _counted(self, values: NDArray[Any], count: int) -> NDArray[Any]:
+        """Return the values themselves, and raise an error unless their number is `count`."""
         if values.size != count:
             raise damaged(
                 f"an array has {values.size} numbers, where {count} are announced: it is truncated or damaged"
@@ -309,9 +343,9 @@ class _Arrays:
         return values
 
     def _block(self, data: bytes | memoryview, is_base64: bool, size: int) -> bytes | memoryview:
-        """Return the bytes of an array, `size` or too few, which follow a header of sizes.
+        """Return the bytes of an array, which follow a header with sizes; raise `ValueError` if they exceed `size`.
 
-        In base 64, header and data are encoded together if the data are plain, and apart if they are compressed.
+        In base 64, header and data are encoded together unless the data are compressed.
         """
         width = self.header.itemsize
 
@@ -353,7 +387,7 @@ class _Arrays:
 
 
 def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
-    """Parse a file; return its root element and a decoder of its arrays."""
+    """Parse a file of a kind, such as ``"ImageData"``, and return its root element and a decoder of its arrays."""
     data = contents(path)
     mark = data.find(b"<AppendedData")
     appended, encoding = b"", "raw"

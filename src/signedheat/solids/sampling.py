@@ -41,8 +41,8 @@ def sample_distances(
     Parameters
     ----------
     shape : Field, Solid or shape
-        A shape, which is completed to a solid; a solid; or a field on a grid that comes from one, as those of
-        `signed_distance` and ``sharpen(field, shape)`` do.
+        A shape, which is completed to a solid, or a solid, or a field on a grid that has one, such as those that
+        `signed_distance` and ``sharpen(field, shape)`` return.
     n : int
         Number of points.
     near : float

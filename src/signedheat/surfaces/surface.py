@@ -266,8 +266,9 @@ class Surface(Frozen, LinearDomain):
         Parameters
         ----------
         start : int, (3,) float, Curve or SurfacePoints; or several of these two
-            A vertex; a point in space, which stands for the nearest point of the surface; or curves and points, of
-            which the path leaves the nearest. With ``field.contour()``, it leads from the zero set of a field.
+            The id of a vertex, a point in space, which stands for the nearest point of the surface, or curves and
+            points. Of these, the path begins at the nearest. With ``field.contour()``, it begins at the zero set of a
+            field.
         end : int, (3,) or (n, 3) float, or SurfacePoints
             A vertex or points. Of several, the path leads to the nearest.
 
