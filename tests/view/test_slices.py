@@ -7,8 +7,8 @@ import signedheat as sh
 from refusals import refused
 from signedheat import samples, view
 from signedheat.view.figures import isolines_between, legible
-from signedheat.view.slice_pictures import cross_section, level_pieces, rounded
-from signedheat.view.surface_pictures import looking
+from signedheat.view.slice_pictures import cross_section, lines_by_style, rounded
+from signedheat.view.surface_pictures import axes_of_view
 
 
 def test_cross_section_of_a_sphere_is_a_circle():
@@ -44,13 +44,13 @@ def test_completed_parts_of_levels_are_dashed():
     u = v = np.linspace(-1, 1, 41)
     radius = np.hypot(*np.meshgrid(u, v, indexing="ij"))
     trusted = np.where(u[:, None] > 0.025, 0.5, 1.0) * np.ones((1, 41))
-    pieces = level_pieces(u, v, radius - 0.8, 0.0, trusted.astype(np.float32))
-    solid, dashed = np.concatenate(pieces["solid"]), np.concatenate(pieces["dashed"])
+    lines = lines_by_style(u, v, radius - 0.8, 0.0, trusted.astype(np.float32))
+    solid, dashed = np.concatenate(lines["solid"]), np.concatenate(lines["dashed"])
     np.testing.assert_allclose(np.hypot(*solid.T), 0.8, atol=2e-3)
     assert solid[:, 0].max() < 0.06 < 0.75 < dashed[:, 0].max() and dashed[:, 0].min() > -0.06
-    lengths = [sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in pieces[k]) for k in pieces]
+    lengths = [sum(np.linalg.norm(np.diff(line, axis=0), axis=1).sum() for line in lines[k]) for k in lines]
     np.testing.assert_allclose(sum(lengths), 1.6 * np.pi, rtol=1e-2)
-    assert not level_pieces(u, v, radius - 0.8, 0.0)["dashed"]
+    assert not lines_by_style(u, v, radius - 0.8, 0.0)["dashed"]
 
 
 def test_a_picture_of_unknown_kind_is_refused(tmp_path):
@@ -69,4 +69,4 @@ def test_isolines_and_labels_are_round_numbers():
 
 
 def test_the_view_along_y_has_x_to_the_right_and_z_up():
-    assert looking(np.array([0.0, -1.0, 0.0])).tolist() == [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    assert axes_of_view(np.array([0.0, -1.0, 0.0])).tolist() == [[1, 0, 0], [0, 0, 1], [0, -1, 0]]

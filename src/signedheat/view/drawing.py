@@ -38,11 +38,11 @@ def save_row(panels: Iterable[tuple[Any, ...]], path: PathLike) -> None:
     Parameters
     ----------
     panels : iterable of (title, thing) or (title, thing, options)
-        A shape or a field, and a dictionary of options for it: ``view`` (elevation and azimuth) of shapes; ``shape``,
-        ``levels`` and ``across`` of fields on grids, as in `draw_slices`; ``sources`` and ``view`` of fields on
-        surfaces, as in `draw_surface`.
+        Title and content of each panel from left to right. The content is a shape or a field. The options are
+        further arguments by name of the function that draws it, which is `draw_shape` for shapes, `draw_slices` for
+        fields on grids in space, `draw_plane` for fields in the plane, and `draw_surface` for fields on surfaces.
     path : str or path
-        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+        The file, in the format ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def save_row(panels: Iterable[tuple[Any, ...]], path: PathLike) -> None:
 
 
 def html_of(thing: object) -> str:
-    """Write a line of text and, if Matplotlib is installed, a picture as HTML."""
+    """Return HTML with the representation of an object and, if it can be drawn and Matplotlib is there, a picture."""
     text = f"<code>{html.escape(repr(thing))}</code>".replace("\n", "<br>")
     try:
         figure = new_figure(3.4 * 1.25, 3.4)  # in inches
@@ -81,7 +81,10 @@ def html_of(thing: object) -> str:
 
 @singledispatch
 def draw(thing: Any, axes: Any, **options: Any) -> bool:
-    """Draw something, or each of a list, into axes, with the options of `save_row`; return whether it can be drawn."""
+    """Draw a shape or field, or each of a list, into Matplotlib axes, and return whether it can be drawn.
+
+    `options` are further arguments of the function that draws it, as in `save_row`.
+    """
     shape = converted(thing)
     if isinstance(shape, list):
         return all([draw(part, axes, **options) for part in shape])
@@ -114,7 +117,10 @@ def _(field: Field[Any], axes: Any, **options: Any) -> bool:
 
 @singledispatch
 def draw_on(domain: object, field: Field[Any], axes: Any, **options: Any) -> bool:
-    """Draw a field into axes; every kind of domain registers a function of its own."""
+    """Draw a field on a surface into axes, and return whether it can be drawn.
+
+    For domains that are not surfaces, other functions are registered.
+    """
     simple = field if isinstance(domain, CutSurface) else field.plain()
     if isinstance(simple.domain, PointCloud) and simple.domain.points.shape[1] != 3:
         return False
@@ -143,7 +149,7 @@ def _(mesh: TetMesh, field: Field[TetMesh], axes: Any, **options: Any) -> bool:
 
 
 def _best_axis(field: Field[Grid]) -> int:
-    """Choose the axis across which a slice shows most of the inside; y, then z, if equal."""
+    """Return the axis across which a slice shows the largest area inside: 0, 1 or 2; if equal, y before z before x."""
     field = field.coarse or field
     inside = field.values < 0
     counts = [int(inside.take(clearest_layer(field, axis), axis).sum()) for axis in range(3)]

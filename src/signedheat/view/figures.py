@@ -27,18 +27,43 @@ mpl_colors: Any = lazy_module("matplotlib.colors", "pictures")
 mpl_figure: Any = lazy_module("matplotlib.figure", "pictures")
 
 PICTURE_FORMATS = frozenset({".png", ".pdf", ".svg", ".jpg"})
+"""Extensions of files to which pictures can be written."""
 INSIDE_TO_OUTSIDE = ["#0b3c5d", "#3f7fae", "#a9cce3", "#fbfaf5", "#f6c9a0", "#d9793a", "#8c2d04"]
 """Colours from far inside to far outside: blue, light at the surface, orange."""
 
 
 def ensure_picture_writable(path: PathLike) -> None:
-    """Check that a picture can be written, before a long computation."""
+    """Raise an error if a picture cannot be written to a file, before a long computation.
+
+    Parameters
+    ----------
+    path : str or path
+        The file, in one of the formats `PICTURE_FORMATS`.
+
+    Raises
+    ------
+    FileFormatError
+        If the format is unknown, or the folder is not writable.
+    MissingPackageError
+        If Matplotlib is not installed.
+    """
     ensure_writable(path, PICTURE_FORMATS, "a picture")
     require("matplotlib", "pictures")
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """Make an empty figure of a width and a height in inches."""
+    """Make an empty Matplotlib figure, without a window.
+
+    Parameters
+    ----------
+    width, height : float
+        Its size in inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, into whose axes functions such as `draw_slices` draw.
+    """
     figure: Figure = mpl_figure.Figure(figsize=(width, height), layout="constrained", facecolor="white")
     backend_agg.FigureCanvasAgg(figure)
     return figure
@@ -46,7 +71,10 @@ def new_figure(width: float, height: float) -> Figure:
 
 @contextmanager
 def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iterator[Figure]:
-    """Yield a figure, which is then written in the format given by the extension."""
+    """Yield an empty figure to draw into; at the end of the ``with`` block, write it to a file.
+
+    `width` and `height` are in inches, and `dpi` is pixels per inch.
+    """
     ensure_picture_writable(path)
     figure = new_figure(width, height)
     yield figure
@@ -55,7 +83,10 @@ def picture(path: PathLike, width: float, height: float, dpi: int = 130) -> Iter
 
 
 def distance_colors(low: float, high: float) -> ScalarMappable:
-    """Make a colour scale, light at zero, by the root of distance, which shows a thin inside beside a wide outside."""
+    """Make a colour scale for distances between two values, light at zero.
+
+    It follows the root of distance, so that a thin inside is visible beside a wide outside.
+    """
     reach = max(abs(low), abs(high), 1e-300)
     return _scale_of(mpl_colors.FuncNorm((signed_root, lambda x: x * np.abs(x)), -reach, reach))
 
@@ -66,7 +97,7 @@ def even_colors(reach: float) -> ScalarMappable:
 
 
 def _scale_of(norm: Any) -> ScalarMappable:
-    """Make a scale of the colours from inside to outside with a Matplotlib norm."""
+    """Make a scale of the colours `INSIDE_TO_OUTSIDE`; a Matplotlib norm maps values to positions on it."""
     colors = mpl_colors.LinearSegmentedColormap.from_list("inside to outside", INSIDE_TO_OUTSIDE)
     return mpl_cm.ScalarMappable(norm, colors)
 
@@ -102,28 +133,34 @@ def round_step(width: float) -> float:
 
 
 def legible(ticks: Floats, low: float, high: float) -> list[float]:
-    """Return zero and the ticks that are far enough from the previous one in the root of distance, in order."""
-    apart = 0.07 * float(signed_root(high) - signed_root(low))  # of the length of the bar
-    kept = [0.0]
+    """Return zero and those ticks of a colour bar from `low` to `high` whose labels do not overlap, in ascending order.
+
+    The length of the bar follows the root of distance.
+    """
+    least = 0.07 * float(signed_root(high) - signed_root(low))  # least step between ticks on the bar
+    result = [0.0]
     for outwards in (ticks[ticks > 0], ticks[ticks < 0][::-1]):
         last = 0.0
         for tick in outwards.tolist():
-            if abs(signed_root(tick) - signed_root(last)) >= apart:
-                kept.append(tick)
+            if abs(signed_root(tick) - signed_root(last)) >= least:
+                result.append(tick)
                 last = tick
-    return sorted(kept)
+    return sorted(result)
 
 
 def add_color_bar(
     figure: Figure | SubFigure, axes: Sequence[Axes], colors: ScalarMappable, isolines: Floats, step: float
 ) -> None:
-    """Add a colour bar that spans the isolines, with round numbers on both sides of zero."""
+    """Add a colour bar beside axes, which spans the values of the isolines, with round numbers on both sides of zero.
+
+    `step` is the difference between isolines, which the label states.
+    """
     bar = figure.colorbar(colors, ax=list(axes), shrink=0.85, pad=0.015)
     kind = "signed distance" if not len(isolines) or isolines[0] < 0 else "distance"
     bar.set_label(f"{kind}, a line every {step:g}")
     if len(isolines):
-        apart = round_step((isolines[-1] - isolines[0]) / 7)  # about seven labels
-        ticks = apart * np.arange(np.ceil(isolines[0] / apart), np.floor(isolines[-1] / apart) + 1)
+        tick_step = round_step((isolines[-1] - isolines[0]) / 7)  # about seven labels
+        ticks = tick_step * np.arange(np.ceil(isolines[0] / tick_step), np.floor(isolines[-1] / tick_step) + 1)
         reach = float(np.max(colors.norm.vmax or 0.0))
         first, last = isolines[0], isolines[-1]
         low = 0.0 if abs(first) < 1e-9 * reach else max(min(first - step, 0.0), -reach)  # no colours beyond the values

@@ -33,28 +33,27 @@ mpl_collections: Any = lazy_module("matplotlib.collections", "pictures")
 
 AXIS_NAMES = "xyz"
 TET_NODES = 80
-"""Nodes along the longest side of the grid at which a field on tets is drawn."""
+"""Number of nodes along the longest side of the grid on which a field on tets is drawn."""
 
 
 def save_slices(
     field: Field[Grid] | Field[TetMesh], path: PathLike, shape: SpaceSources | None = None, levels: Sequence[float] = ()
 ) -> None:
-    """Write a picture of three orthogonal slices through a field, each through most of the inside, with the shape.
+    """Write a picture of three orthogonal slices through a field.
 
-    Blue is inside, orange outside; the black line is φ = 0, dashed where surface was completed; the shape is red;
-    nodes without a value are grey. A field in the plane is drawn whole.
+    Each slice is where its area inside is largest. Blue is inside, orange outside, and grey without a value. The black
+    line is φ = 0, dashed where the surface was completed, and the shape is red. A field in the plane is drawn whole.
 
     Parameters
     ----------
     field : Field
-        On a grid or tets.
-        A field in two or three dimensions.
+        A field on a grid in two or three dimensions, in a band, or on tets.
     path : str or path
-        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+        The file, in the format ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     shape : a shape, optional
-        The source of the field. In the plane, a `Polyline` or a sequence of them.
+        The shape to which φ is the distance, to be drawn too. In the plane, a `Polyline` or a sequence of them.
     levels : sequence of float
-        Further levels to draw, with heavier lines than the isolines.
+        Further values of φ whose level sets are drawn, with heavier lines than the isolines.
 
     Raises
     ------
@@ -86,9 +85,23 @@ def draw_slices(
     levels: Sequence[float] = (),
     across: Sequence[int] = (2, 1, 0),
 ) -> None:
-    """Draw a slice into each of some axes of a figure; `across` lists their constant coordinates."""
+    """Draw slices through a field in space, each where its area inside is largest, and a colour bar.
+
+    Parameters
+    ----------
+    field : Field
+        A field on a grid in three dimensions. Of a field in a band, the coarse field is drawn.
+    axes : sequence of Matplotlib axes
+        The axes of a figure, one for each slice.
+    shape : a shape, optional
+        A shape whose section with each slice is drawn in red.
+    levels : sequence of float
+        Further values of φ whose level sets are drawn, with heavier lines than the isolines.
+    across : sequence of int
+        The axis normal to each slice: 0, 1 or 2.
+    """
     field = field.coarse or field
-    colors, isolines, step = _look(field)
+    colors, isolines, step = _colors_and_isolines(field)
     for panel, normal in zip(axes, across, strict=True):
         horizontal, vertical = (axis for axis in range(3) if axis != normal)
         layer = clearest_layer(field, normal)
@@ -104,7 +117,10 @@ def draw_slices(
 
 
 def clearest_layer(field: Field[Grid], axis: int) -> int:
-    """Choose the layer across an axis with most nodes inside, or else near zero; of similar ones the most central."""
+    """Return the index along an axis of the layer of nodes with the most nodes inside, or if there are none, near zero.
+
+    Of layers with nearly as many, it is the one nearest to the middle.
+    """
     inside = field.values < 0
     if not inside.any():
         inside = np.abs(field.values) < 1.5 * field.domain.spacing.max()
@@ -121,8 +137,20 @@ def rounded(position: float, spacing: float) -> str:
 
 
 def draw_plane(field: Field[Grid], axes: Axes, shape: SpaceSources | None = None, levels: Sequence[float] = ()) -> None:
-    """Draw a field in the plane into axes, with polylines or points in red."""
-    colors, isolines, step = _look(field)
+    """Draw a field in the plane with isolines and a colour bar.
+
+    Parameters
+    ----------
+    field : Field
+        A field on a grid in two dimensions.
+    axes : Matplotlib axes
+        Where to draw it.
+    shape : Polyline, PointCloud or a sequence of them, optional
+        What is drawn in red on top; other shapes are left out.
+    levels : sequence of float
+        Further values of φ whose level sets are drawn, with heavier lines than the isolines.
+    """
+    colors, isolines, step = _colors_and_isolines(field)
     u, v = field.domain.axes
     _draw_panel(axes, u, v, field.values, colors, isolines, levels)
     for line in shape if isinstance(shape, Sequence) else [shape]:
@@ -135,13 +163,13 @@ def draw_plane(field: Field[Grid], axes: Axes, shape: SpaceSources | None = None
 
 
 def draw_line(line: Polyline, axes: Axes) -> None:
-    """Draw a polyline in red on top."""
+    """Draw a polyline in the plane into axes, in red above everything else."""
     points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
     axes.plot(*points.T, color="#d4145a", linewidth=2.0, zorder=3)
 
 
-def _look(field: Field[Grid]) -> tuple[ScalarMappable, Floats, float]:
-    """Choose colours, isolines and the step between them, shared by all panels of a picture."""
+def _colors_and_isolines(field: Field[Grid]) -> tuple[ScalarMappable, Floats, float]:
+    """Return a colour scale for a field, values of its isolines, and the step between these."""
     low, high = range_of(field.values)
     return distance_colors(low, high), *isolines_between(low, high)
 
@@ -156,7 +184,25 @@ def _draw_panel(
     levels: Sequence[float],
     trusted: NDArray[np.float32] | None = None,
 ) -> None:
-    """Draw values on a plane, indexed [u, v], as colours and isolines; levels are dashed where confidence is low."""
+    """Draw values at the nodes of a plane grid as colours and isolines.
+
+    Parameters
+    ----------
+    panel : Matplotlib axes
+        Where to draw.
+    u, v : (nu,) and (nv,) float
+        Coordinates of the nodes.
+    values : (nu, nv) float
+        Values at the nodes; NaN is grey.
+    colors : ScalarMappable
+        Colours of the values.
+    isolines : (k,) float
+        Values of the isolines.
+    levels : sequence of float
+        Further values, whose level sets have heavier green lines. That of 0 is black.
+    trusted : (nu, nv) float, optional
+        Confidence, below 1 where the surface was completed; there, the heavier lines are dashed.
+    """
     shown = np.ma.masked_invalid(values.T)
     shading: Literal["nearest", "gouraud"] = "nearest" if shown.mask.any() else "gouraud"
     panel.pcolormesh(u, v, shown, shading=shading, rasterized=True).set(cmap=colors.cmap, norm=colors.norm)
@@ -167,7 +213,7 @@ def _draw_panel(
         panel.contour(u, v, shown, isolines, colors="#20303c", linewidths=0.35, alpha=0.7)
     for level, color in ((0.0, "black"), *((level, "#1b6e3c") for level in levels)):
         if low < level < high:
-            for style, lines in level_pieces(u, v, values, level, trusted).items():
+            for style, lines in lines_by_style(u, v, values, level, trusted).items():
                 panel.add_collection(
                     mpl_collections.LineCollection(lines, colors=color, linewidths=1.3, linestyles=style, zorder=2)
                 )
@@ -177,33 +223,39 @@ def _draw_panel(
         spine.set_visible(False)
 
 
-def level_pieces(
+def lines_by_style(
     u: Floats, v: Floats, values: Floats, level: float, trusted: NDArray[np.float32] | None = None
 ) -> dict[str, list[Floats]]:
-    """Return the lines of a level on a plane: solid on the shape, dashed on its completion."""
+    """Return the level set of values at the nodes of a plane grid as (k, 2) polylines, by style.
+
+    They are ``"solid"`` where the confidence `trusted` is 1 and ``"dashed"`` elsewhere, on completed surface.
+    """
     spacing = np.array([u[1] - u[0], v[1] - v[0]])
-    pieces: dict[str, list[Floats]] = {"solid": [], "dashed": []}
+    lines: dict[str, list[Floats]] = {"solid": [], "dashed": []}
     for line, _ in level_lines(values, np.ones(2), level):
-        places = line * spacing + [u[0], v[0]]
-        visible = np.ones(len(line), dtype=bool)
+        points = line * spacing + [u[0], v[0]]
+        is_given = np.ones(len(line), dtype=bool)
         if trusted is not None:
-            visible = scipy.ndimage.map_coordinates(trusted, line.T, order=0, mode="nearest") >= 1.0
-        of_edge = visible[1:] & visible[:-1]
-        ends = np.flatnonzero(np.diff(of_edge)) + 1
-        for first, last in pairwise([0, *ends.tolist(), len(of_edge)]):
+            is_given = scipy.ndimage.map_coordinates(trusted, line.T, order=0, mode="nearest") >= 1.0
+        is_solid = is_given[1:] & is_given[:-1]  # for each segment
+        ends = np.flatnonzero(np.diff(is_solid)) + 1
+        for first, last in pairwise([0, *ends.tolist(), len(is_solid)]):
             if last > first:
-                pieces["solid" if of_edge[first] else "dashed"].append(places[first : last + 1])
-    return pieces
+                lines["solid" if is_solid[first] else "dashed"].append(points[first : last + 1])
+    return lines
 
 
 def cross_section(mesh: TriangleMesh, axis: int, position: float) -> Floats:
-    """Return (s, 2, 2) ends, in the other coordinates, of the segments in which a plane across an axis cuts a mesh."""
+    """Return the segments in which the plane of points with a given position on an axis cuts a mesh.
+
+    The result has the (s, 2, 2) ends of s segments, in the other two coordinates.
+    """
     corners = mesh.vertices[mesh.faces]
     height = corners[:, :, axis] - position
     above = height >= 0
     cut = np.flatnonzero(above.any(axis=1) & ~above.all(axis=1))
     corners, height, above = corners[cut], height[cut], above[cut]
-    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
+    lone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))  # the corner that lies alone
     row = np.arange(len(cut))
     ends = []
     for step in (1, 2):
@@ -214,7 +266,7 @@ def cross_section(mesh: TriangleMesh, axis: int, position: float) -> Floats:
 
 
 def _draw_section(panel: Axes, given: Any, axis: int, position: float, spacing: float) -> None:
-    """Draw in red where a plane across an axis cuts a shape, or the points within a spacing of the plane."""
+    """Draw in red where a plane normal to an axis cuts a shape `given`, or the points within a spacing of the plane."""
     shape = None if given is None else outside_of(given)
     if isinstance(shape, PointCloud):
         near = shape.points[np.abs(shape.points[:, axis] - position) < spacing]

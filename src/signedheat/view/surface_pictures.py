@@ -45,7 +45,7 @@ from .figures import (
 )
 
 LONGER_SIDE = 900
-"""Width or height of the pictures of surfaces, whichever is larger, in pixels."""
+"""The larger of width and height of pictures of surfaces, in pixels."""
 MARGIN_PIXELS = 10
 """Width of the empty margin in pixels."""
 VIEW_ANGLES = (22, -58)
@@ -56,7 +56,7 @@ LIGHT = np.array([0.25, 0.35, 0.9]) / np.linalg.norm([0.25, 0.35, 0.9])
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A parallel projection."""
+    """A parallel projection from space to the pixels of a picture."""
 
     frame: Floats  # (3, 3) right, up and towards the eye
     lower: Floats  # (2,) lower left corner of the picture, in units of length
@@ -66,28 +66,34 @@ class Camera:
 
     @classmethod
     def around(cls, points: Floats, direction: Floats, up: int = 2) -> Camera:
-        """Make a camera that views points from a direction, axis `up` pointing up, so that they fill the picture."""
-        frame = looking(direction, up)
-        seen = points @ frame[:2].T
-        lower, upper = seen.min(axis=0), seen.max(axis=0)
+        """Make a camera whose picture is filled by (n, 3) points, seen from a direction.
+
+        `direction` leads from the points to the eye, and axis `up` (0, 1 or 2) points up in the picture.
+        """
+        frame = axes_of_view(direction, up)
+        projected = points @ frame[:2].T
+        lower, upper = projected.min(axis=0), projected.max(axis=0)
         scale = (LONGER_SIDE - 2 * MARGIN_PIXELS) / max(float((upper - lower).max()), 1e-300)
         width, height = (np.ceil((upper - lower) * scale).astype(int) + 2 * MARGIN_PIXELS).tolist()
         return cls(frame, lower, scale, width, height)
 
     def pixels(self, points: Floats) -> Floats:
-        """Return (n, 3) column, row and depth of points in space; larger depths are nearer."""
-        seen = points @ self.frame.T
-        return np.column_stack([(seen[:, :2] - self.lower) * self.scale + MARGIN_PIXELS, seen[:, 2] * self.scale])
+        """Return the column, row and depth of (n, 3) points in pixels, (n, 3). Depths grow towards the eye."""
+        rotated = points @ self.frame.T
+        return np.column_stack([(rotated[:, :2] - self.lower) * self.scale + MARGIN_PIXELS, rotated[:, 2] * self.scale])
 
     def shades(self, area_vectors: Floats) -> Floats:
-        """Return (m,) brightness of faces, from 0.45 to 1, the same for both sides of a face."""
+        """Return the (m,) brightness of faces with (m, 3) area vectors, from 0.45 to 1, the same for both sides."""
         normals = area_vectors @ self.frame.T
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
         return 0.45 + 0.55 * np.abs(normals @ LIGHT)
 
 
-def looking(direction: Floats, up: int = 2) -> Floats:
-    """Return (3, 3) unit vectors right, up and towards the eye, for a direction towards the eye."""
+def axes_of_view(direction: Floats, up: int = 2) -> Floats:
+    """Return (3, 3) unit vectors to the right, upwards and towards the eye, for a direction towards the eye.
+
+    Axis `up` points upwards in the picture, unless the eye looks along it.
+    """
     towards = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
     upwards = np.eye(3)[up] if abs(towards[up]) < 0.95 else np.eye(3)[up - 1]
     right = np.cross(upwards, towards)
@@ -96,28 +102,53 @@ def looking(direction: Floats, up: int = 2) -> Floats:
 
 
 def oblique(elevation: float, azimuth: float, up: int = 2) -> Floats:
-    """Return the direction to the eye at an elevation above the plane across axis `up`, and an azimuth, in degrees."""
+    """Return the (3,) direction to an eye at an elevation above the plane normal to axis `up`, and an azimuth.
+
+    Both are in degrees.
+    """
     e, a = np.radians([elevation, azimuth])
     return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], up - 2)
 
 
 def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple[Floats, Ints, Floats]:
-    """Draw triangles (m, 3, 3) in pixels and depth, with values (m, 3); return depth, face or −1, and value or NaN."""
+    """Return the depth, face and value at each pixel of a picture of triangles.
+
+    Parameters
+    ----------
+    corners : (m, 3, 3) float
+        Column, row and depth of the corners of the triangles in pixels, as `Camera.pixels` returns them.
+    values : (m, 3) float
+        Values at the corners.
+    width, height : int
+        The size of the picture in pixels.
+
+    Returns
+    -------
+    depth : (height, width) float
+        The depth of the nearest triangle; −∞ if there is none.
+    face : (height, width) int
+        The number of this triangle, or −1.
+    value : (height, width) float
+        The interpolated value on it, or NaN.
+    """
     depth, face = np.full(height * width, -np.inf), np.full(height * width, -1)
-    shown = np.full(height * width, np.nan)
+    value = np.full(height * width, np.nan)
     _draw(np.ascontiguousarray(corners), width, height, depth, face)
     pixels = np.flatnonzero(face >= 0)
     a, b, c = (corners[face[pixels], k, :2] @ [1, 1j] for k in range(3))
-    away = pixels % width + 1j * (pixels // width) - a
+    from_a = pixels % width + 1j * (pixels // width) - a
     area = (np.conj(b - a) * (c - a)).imag
-    u, v = (np.conj(away) * (c - a)).imag / area, (np.conj(b - a) * away).imag / area
-    shown[pixels] = (np.stack([1 - u - v, u, v], axis=1) * values[face[pixels]]).sum(axis=1)
-    return depth.reshape(height, width), face.reshape(height, width), shown.reshape(height, width)
+    u, v = (np.conj(from_a) * (c - a)).imag / area, (np.conj(b - a) * from_a).imag / area
+    value[pixels] = (np.stack([1 - u - v, u, v], axis=1) * values[face[pixels]]).sum(axis=1)
+    return depth.reshape(height, width), face.reshape(height, width), value.reshape(height, width)
 
 
 @compiled
 def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -> None:
-    """Write depth and face of the nearest triangle at each pixel; in a row it covers its left end but not its right."""
+    """Write the depth and number of the nearest triangle at each pixel into `depth` and `face`, (height · width,).
+
+    In each row a triangle covers its left end and not its right, so that each pixel is in one of two neighbours.
+    """
     for t in range(len(corners)):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
@@ -149,7 +180,7 @@ def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -
 
 @compiled
 def _crossed(ax: float, ay: float, bx: float, by: float, y: float) -> float:
-    """Return where a row crosses a side: the same number whichever end of the side is given first."""
+    """Return x of the point of the side from a to b at height y, the same number if a and b are swapped."""
     if ay > by:
         ax, ay, bx, by = bx, by, ax, ay
     return ax + (bx - ax) * ((y - ay) / (by - ay))
@@ -160,10 +191,20 @@ if TYPE_CHECKING:
     from matplotlib.cm import ScalarMappable
 
 OUTER_COLOR, INNER_COLOR = np.array([0.96, 0.86, 0.55]), np.array([0.80, 0.25, 0.20])
+"""Colours of the outer and inner sides of faces, red, green and blue from 0 to 1."""
 
 
 def save_scene(shape: Shape | ForeignShape, path: PathLike, up: int = 2) -> None:
-    """Write a picture of a shape seen obliquely from above, with axis `up` pointing up.
+    """Write a picture of a shape, seen obliquely from above.
+
+    Parameters
+    ----------
+    shape : a shape
+        The shape.
+    path : str or path
+        The file, in the format ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+    up : int
+        The axis that points up in the picture: 0, 1 or 2.
 
     Raises
     ------
@@ -183,7 +224,21 @@ def draw_shape(
     up: int = 2,
     colors: Floats | None = None,
 ) -> None:
-    """Draw a shape into axes, seen from an elevation and an azimuth in degrees; triangles may have (m, 3) colours."""
+    """Draw a shape in space, with the inner sides of its faces in red.
+
+    Parameters
+    ----------
+    shape : a shape
+        The shape. Of voxels and tets, the boundary is drawn.
+    axes : Matplotlib axes
+        Where to draw it.
+    view : (elevation, azimuth)
+        The direction to the eye in degrees.
+    up : int
+        The axis that points up in the picture: 0, 1 or 2.
+    colors : (m, 3) float, optional
+        Colours of the faces of a triangle mesh, red, green and blue from 0 to 1.
+    """
     shape = outside_of(shape)
     direction = oblique(*view, up)
     axes.set_axis_off()
@@ -201,7 +256,10 @@ def draw_shape(
 
 
 def draw_points(points: Floats, axes: Axes, direction: Floats, up: int = 2, colors: Floats | None = None) -> None:
-    """Draw points into axes from far to near, in (n, 4) colours or in a blue that darkens with nearness."""
+    """Draw (n, 3) points into axes, seen from a direction, the nearer above the farther.
+
+    They have (n, 4) colours, or are blue, darker the nearer they are. Of many points, only some are drawn.
+    """
     drawn = slice(None, None, max(1, len(points) // 200_000))  # of larger clouds an even subset
     pixels = Camera.around(points[drawn], direction, up).pixels(points[drawn])
     order = np.argsort(pixels[:, 2])
@@ -215,7 +273,7 @@ def draw_points(points: Floats, axes: Axes, direction: Floats, up: int = 2, colo
 
 
 def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | PointCloud:
-    """Return the visible surface of a shape: of voxels and tets their boundary."""
+    """Return the mesh or point cloud to draw for a shape: the boundary of voxels and tets, or else the shape itself."""
     own = as_shape(shape)
     if isinstance(own, DigitalSurface):
         return own.squares
@@ -223,7 +281,7 @@ def outside_of(shape: Shape | ForeignShape) -> TriangleMesh | PolygonMesh | Poin
 
 
 def triangulated(mesh: TriangleMesh | PolygonMesh) -> TriangleMesh:
-    """Split polygons into fans around their centroids, which is fast and good enough to draw."""
+    """Split polygons into triangles around their centroids, which is fast and accurate enough to draw."""
     if isinstance(mesh, TriangleMesh):
         return mesh
     center = mesh.n_vertices + mesh.corner_polygons
@@ -238,20 +296,20 @@ def save_surface(
     n_contours: int = 20,
     up: int = 2,
 ) -> None:
-    """Write a picture of a surface coloured by φ, with isolines, from a direction from which the sources are visible.
+    """Write a picture of a surface coloured by φ, with isolines, seen from a side that shows the sources.
 
-    Blue is φ < 0, orange φ > 0; the heavy line is φ = 0; sources are yellow.
+    Blue is φ < 0, orange φ > 0, the heavy line is φ = 0, and sources are yellow.
 
     Parameters
     ----------
     field : Field
         Distance on a surface.
     path : str or path
-        The picture: ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
+        The file, in the format ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     sources : Curve, SurfacePoints or a sequence of them
         The sources to draw.
     n_contours : int
-        Approximate number of isolines.
+        The approximate number of isolines; 0 for none.
     up : int
         Axis that points upwards: 0, 1 or 2.
 
@@ -278,9 +336,24 @@ def draw_surface(
     up: int = 2,
     colors: ScalarMappable | None = None,
 ) -> None:
-    """Draw φ on a surface into axes, with isolines and a colour bar; with given `colors`, without either.
+    """Draw a field on a surface as colours, with isolines and a colour bar.
 
-    `view` is a direction from the surface to the eye.
+    Parameters
+    ----------
+    field : Field
+        Distance on a surface.
+    axes : Matplotlib axes
+        Where to draw it.
+    sources : Curve, SurfacePoints or a sequence of them
+        The sources to draw, in yellow.
+    n_contours : int
+        The approximate number of isolines; 0 for none.
+    view : (3,) float, optional
+        The direction from the surface to the eye; by default a side that shows the sources.
+    up : int
+        The axis that points up in the picture: 0, 1 or 2.
+    colors : matplotlib.cm.ScalarMappable, optional
+        The colours of values. If they are given, isolines and colour bar are left out.
     """
     own, mesh, values = _own_and_painted(field)
     given = sources if isinstance(sources, Sequence) else [sources]
@@ -309,7 +382,7 @@ def draw_surface(
 
 
 def _own_and_painted(field: Field[Any]) -> tuple[TriangleMesh, Any, Floats]:
-    """Return the triangles to which sources refer, and those on which φ is linear with the values at their vertices."""
+    """Return the mesh to whose faces sources refer, the mesh on whose faces φ is linear, and φ at its (n,) vertices."""
     domain = field.domain
     surface = domain.surface if isinstance(domain, CutSurface) else domain
     own = surface.mesh if isinstance(surface, IntrinsicTriangulation) else surface.triangulation
@@ -319,19 +392,31 @@ def _own_and_painted(field: Field[Any]) -> tuple[TriangleMesh, Any, Floats]:
 
 
 def darken(image: Floats, phi: Floats, covered: Bools, step: float) -> None:
-    """Darken the pixels of isolines at multiples of a step, one pixel wide, and of a heavier one at zero."""
+    """Draw isolines at multiples of `step`, and a heavier one at zero, by darkening pixels of an image.
+
+    Parameters
+    ----------
+    image : (height, width, 3) float
+        The colours, which are changed.
+    phi : (height, width) float
+        The value of the field at each pixel.
+    covered : (height, width) bool
+        The pixels that the surface covers.
+    step : float
+        The difference between isolines.
+    """
     for spacing, width, strength in ((step, 0.6, 0.55), (np.inf, 1.4, 0.9)):
         level = phi / spacing if np.isfinite(spacing) else phi
         rise = np.hypot(*np.gradient(level))
-        away = np.abs(level - np.round(level)) if np.isfinite(spacing) else np.abs(level)
+        off = np.abs(level - np.round(level)) if np.isfinite(spacing) else np.abs(level)  # from the nearest isoline
         with np.errstate(invalid="ignore", divide="ignore"):
-            cover = np.clip(width + 0.5 - away / rise, 0, 1)
+            cover = np.clip(width + 0.5 - off / rise, 0, 1)
         smooth = covered & np.isfinite(cover) & (rise < 0.5 if np.isfinite(spacing) else rise < 2 * step)
         image[smooth] *= (1 - strength * cover[smooth])[:, None]
 
 
 def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: Floats) -> None:
-    """Draw the visible parts of a source."""
+    """Draw the parts of a source on a mesh that are not behind the surface, whose depth at each pixel is given."""
     points = np.einsum("ik,ikj->ij", item.barycentric, mesh.vertices[mesh.faces[item.faces]])
     if isinstance(item, Curve) and item.closed:
         points = np.concatenate([points, points[:1]])
@@ -347,7 +432,10 @@ def draw_source(axes: Axes, item: Any, mesh: Any, camera: Camera, depth: Floats)
 
 
 def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> Floats:
-    """Choose a direction from which most of the sources are visible; for flat surfaces, along their normals."""
+    """Return a (3,) direction to the eye from which most of the sources are visible.
+
+    Without sources it is an oblique view, for flat surfaces along their normal.
+    """
     normals = [mesh.face_area_vectors[s.faces] for s in sources]
     mean = np.zeros(3)
     if normals:
@@ -366,98 +454,102 @@ def toward_sources(mesh: TriangleMesh, sources: Sequence[Any], up: int = 2) -> F
 
 
 DEVIATION_FORMATS = frozenset({".csv", ".ply"}) | PICTURE_FORMATS
+"""Extensions of files to which deviations can be written."""
 THICKNESS_FORMATS = frozenset({".npz", ".ply"}) | PICTURE_FORMATS
-COLORS = np.array([[int(color[at : at + 2], 16) for at in (1, 3, 5)] for color in INSIDE_TO_OUTSIDE])
+"""Extensions of files to which thickness can be written."""
+COLORS = np.array([[int(color[k : k + 2], 16) for k in (1, 3, 5)] for color in INSIDE_TO_OUTSIDE])
+"""The colours `INSIDE_TO_OUTSIDE` as (k, 3) red, green and blue from 0 to 255."""
 
 
-def save_deviation(found: Deviation, path: PathLike) -> None:
-    """Write deviations as a coloured shape, a picture or a table."""
+def save_deviation(deviation: Deviation, path: PathLike) -> None:
+    """Write deviations as a coloured shape (PLY), a picture, or a table (CSV) of points, distances, nearest points."""
     ensure_writable(path, DEVIATION_FORMATS, "deviations")
     if extension(path) in PICTURE_FORMATS:
-        return _draw_deviation(found, path)
+        return _draw_deviation(deviation, path)
     with replacing(path) as temporary:
         if extension(path) == ".ply":
-            scan = elements(found.scan, {"deviation": found.distances})
-            reach = found.extreme or 1.0
-            temporary.write_bytes(write_ply(scan, path, _mixed(found.distances, -reach, reach, COLORS)))
+            scan = elements(deviation.scan, {"deviation": deviation.distances})
+            reach = deviation.extreme or 1.0
+            temporary.write_bytes(write_ply(scan, path, _colors_of(deviation.distances, -reach, reach, COLORS)))
         else:
-            rows, names = np.column_stack([found.points, found.distances, found.nearest]), "x,y,z,deviation"
+            rows, names = np.column_stack([deviation.points, deviation.distances, deviation.nearest]), "x,y,z,deviation"
             np.savetxt(temporary, rows, "%.9g", ",", header=f"{names},nearest_x,nearest_y,nearest_z", comments="")
 
 
-def save_thickness(found: Thickness, path: PathLike) -> None:
-    """Write thickness as a coloured shape, arrays or a picture."""
+def save_thickness(thickness: Thickness, path: PathLike) -> None:
+    """Write thickness as a coloured shape (PLY), arrays (NPZ) or a picture."""
     ensure_writable(path, THICKNESS_FORMATS, "thickness")
-    mesh = found.mesh
+    mesh = thickness.mesh
     if extension(path) in PICTURE_FORMATS:
-        _draw_thickness(found, path)
+        _draw_thickness(thickness, path)
     elif extension(path) == ".npz":
-        arrays = {"vertices": mesh.vertices, "faces": mesh.faces, "origins": found.origins}
-        write_npz(path, **arrays, thickness=found.values)
+        arrays = {"vertices": mesh.vertices, "faces": mesh.faces, "origins": thickness.origins}
+        write_npz(path, **arrays, thickness=thickness.values)
     else:  # each face with corners of its own, since programs show colours of vertices
         corners, counts = mesh.vertices[mesh.faces].reshape(-1, 3), np.full(mesh.n_faces, 3)
-        shape = Elements(corners, np.arange(len(corners)), counts, values={"thickness": np.repeat(found.values, 3)})
+        shape = Elements(corners, np.arange(len(corners)), counts, values={"thickness": np.repeat(thickness.values, 3)})
         with replacing(path) as temporary:
-            temporary.write_bytes(write_ply(shape, path, np.repeat(_thickness_colors(found), 3, axis=0)))
+            temporary.write_bytes(write_ply(shape, path, np.repeat(_thickness_colors(thickness), 3, axis=0)))
 
 
-def _mixed(values: Floats, low: float, high: float, stops: Ints) -> NDArray[np.uint8]:
-    """Return (n, 3) colours of values between two limits."""
-    places = np.linspace(low, high, len(stops))
-    mixed = [np.interp(values, places, stops[:, channel]) for channel in range(3)]
-    return np.stack(mixed, axis=1).round().astype(np.uint8)
+def _colors_of(values: Floats, low: float, high: float, stops: Ints) -> NDArray[np.uint8]:
+    """Return (n, 3) colours of values, interpolated between (k, 3) colours at even steps from `low` to `high`."""
+    positions = np.linspace(low, high, len(stops))
+    channels = [np.interp(values, positions, stops[:, channel]) for channel in range(3)]
+    return np.stack(channels, axis=1).round().astype(np.uint8)
 
 
-def _thickness_colors(found: Thickness) -> NDArray[np.uint8]:
-    """Return (m, 3) colours of faces: thin walls orange, thick ones blue, grey where nothing is opposite."""
-    known = ~np.isnan(found.values)
+def _thickness_colors(thickness: Thickness) -> NDArray[np.uint8]:
+    """Return (m, 3) colours of faces: orange for thin walls, blue for thick ones, grey for faces without thickness."""
+    known = ~np.isnan(thickness.values)
     colors = np.full((len(known), 3), 190, dtype=np.uint8)
     if known.any():
-        colors[known] = _mixed(found.values[known], *_limits(found), COLORS[::-1])
+        colors[known] = _colors_of(thickness.values[known], *_limits(thickness), COLORS[::-1])
     return colors
 
 
-def _limits(found: Thickness) -> tuple[float, float]:
-    """Return the thicknesses at which colours begin and end."""
-    low, high = found.percentiles([0.0, 95.0]).tolist()
+def _limits(thickness: Thickness) -> tuple[float, float]:
+    """Return the thicknesses of the first and the last colour: the least, and one that 95 % do not exceed."""
+    low, high = thickness.percentiles([0.0, 95.0]).tolist()
     return (low, high) if high > low + 1e-9 * high else (0.0, high)
 
 
-def _draw_thickness(found: Thickness, path: PathLike) -> None:
-    """Draw the faces in colours, and a histogram of area over thickness."""
-    low, high = _limits(found)
-    colors = _thickness_colors(found) / 255
+def _draw_thickness(thickness: Thickness, path: PathLike) -> None:
+    """Write a picture of the faces in colours, and a histogram of area over thickness."""
+    low, high = _limits(thickness)
+    colors = _thickness_colors(thickness) / 255
     with picture(path, 12, 5) as figure:
         surface, histogram = figure.subplots(1, 2)
-        draw_shape(found.mesh, surface, VIEW_ANGLES, colors=colors)
-        known = np.flatnonzero(~np.isnan(found.values))
-        values, areas = np.clip(found.values[known], low, high), found.mesh.face_areas
+        draw_shape(thickness.mesh, surface, VIEW_ANGLES, colors=colors)
+        known = np.flatnonzero(~np.isnan(thickness.values))
+        values, areas = np.clip(thickness.values[known], low, high), thickness.mesh.face_areas
         counts, limits = np.histogram(values, HISTOGRAM_BINS, (low, high), weights=100 * areas[known] / areas.sum())
         middles = 0.5 * (limits[1:] + limits[:-1])
-        bars: Any = {"color": _mixed(middles, low, high, COLORS[::-1]) / 255, "edgecolor": "0.5", "linewidth": 0.5}
+        bars: Any = {"color": _colors_of(middles, low, high, COLORS[::-1]) / 255, "edgecolor": "0.5", "linewidth": 0.5}
         histogram.bar(middles, counts, np.diff(limits), **bars)
-        least, place = found.thinnest
-        where = ", ".join(f"{x:.4g}" for x in place)
+        least, point = thickness.thinnest
+        where = ", ".join(f"{x:.4g}" for x in point)
+        median = thickness.percentiles([50])[0]
         histogram.set(xlabel=f"thickness (the last bar: all beyond {limits[-2]:.3g})", ylabel="% of the area")
-        histogram.set_title(f"thinnest {least:.4g}, at ({where})\nmedian {found.percentiles([50])[0]:.4g}", fontsize=10)
+        histogram.set_title(f"thinnest {least:.4g}, at ({where})\nmedian {median:.4g}", fontsize=10)
 
 
-def _draw_deviation(found: Deviation, path: PathLike) -> None:
-    """Draw the scan in colours, and a histogram with percentiles; without isolines, since scans are noisy."""
-    scale = even_colors(found.extreme or 1.0)
+def _draw_deviation(deviation: Deviation, path: PathLike) -> None:
+    """Write a picture of the scan in colours, without isolines, since scans are noisy, and a histogram."""
+    scale = even_colors(deviation.extreme or 1.0)
     with picture(path, 12, 5) as figure:
         scan, histogram = figure.subplots(1, 2)
-        if isinstance(found.scan, PointCloud):
-            draw_points(found.points, scan, oblique(*VIEW_ANGLES), colors=scale.to_rgba(found.distances))
+        if isinstance(deviation.scan, PointCloud):
+            draw_points(deviation.points, scan, oblique(*VIEW_ANGLES), colors=scale.to_rgba(deviation.distances))
         else:
-            draw_surface(Field(found.scan, found.distances), scan, colors=scale)
+            draw_surface(Field(deviation.scan, deviation.distances), scan, colors=scale)
         figure.colorbar(scale, ax=scan, shrink=0.85, pad=0.015, extend="both", format="{x:g}")
-        counts, limits = found.histogram()
+        counts, limits = deviation.histogram()
         middles = 0.5 * (limits[1:] + limits[:-1])
-        look = {"color": scale.to_rgba(middles), "edgecolor": "0.5", "linewidth": 0.5}
-        histogram.bar(middles, counts, np.diff(limits), **look)
-        low, middle, high = found.percentiles((1, 50, 99))
-        title = f"root mean square {found.rms:.4g}\n1 %: {low:.4g}, 50 %: {middle:.4g}, 99 %: {high:.4g}"
+        bars = {"color": scale.to_rgba(middles), "edgecolor": "0.5", "linewidth": 0.5}
+        histogram.bar(middles, counts, np.diff(limits), **bars)
+        low, middle, high = deviation.percentiles((1, 50, 99))
+        title = f"root mean square {deviation.rms:.4g}\n1 %: {low:.4g}, 50 %: {middle:.4g}, 99 %: {high:.4g}"
         beyond = f"the first and last bar: all beyond {limits[-2]:.3g}"
         histogram.set(xlabel=f"deviation, positive outside of the nominal part\n({beyond})", ylabel="points")
         histogram.set_title(title, fontsize=10)

@@ -19,7 +19,9 @@ from .surface_pictures import INNER_COLOR, OUTER_COLOR
 pyvista: Any = lazy_module("pyvista", "windows")
 
 BODY = "#d8d2c0"
+"""Colour of points, lines and zero sets."""
 LINE = "#1a1a1a"
+"""Colour of isolines, outlines and polylines in the plane."""
 
 
 def plotter_of(thing: object) -> Any:
@@ -32,7 +34,10 @@ def plotter_of(thing: object) -> Any:
 
 @singledispatch
 def add(thing: Any, plotter: Any) -> None:
-    """Draw a shape, with its inner sides in another colour; other kinds are registered below."""
+    """Add a shape to a `pyvista.Plotter`, with the inner sides of faces in another colour.
+
+    For polylines, grids and fields, other functions are registered.
+    """
     if isinstance(thing, TetMesh):
         thing = thing.boundary
     mesh = thing.to_pyvista()
@@ -63,7 +68,7 @@ def _(grid: Grid, plotter: Any) -> None:
 def _(field: Field[Any], plotter: Any) -> None:
     in_space = isinstance(field.domain, Grid | TetMesh)
     field = (field.coarse or field) if in_space else field.expand()
-    drawn, look = field.to_pyvista(), _look(field.values)
+    drawn, look = field.to_pyvista(), _options_of(field.values)
     if not in_space:
         _add_colors(plotter, drawn, look, point_size=6, render_points_as_spheres=True)
         if drawn.faces.size:
@@ -77,8 +82,12 @@ def _(field: Field[Any], plotter: Any) -> None:
         _add_zero_set(plotter, field)
 
 
-def _look(values: Any) -> dict[str, Any]:
-    """Choose colours centred on zero, and isolines."""
+def _options_of(values: Any) -> dict[str, Any]:
+    """Return how the values of a field are drawn, by name.
+
+    ``reach`` is the largest absolute value, at which colours end on both sides of zero, ``colors`` a Matplotlib colour
+    map, ``levels`` the values of isolines, and ``zero`` tells whether there are values on both sides of zero.
+    """
     low, high = range_of(values)
     reach = max(abs(low), abs(high), 1e-300)
     levels = isolines_between(low, high)[0]
@@ -86,6 +95,7 @@ def _look(values: Any) -> dict[str, Any]:
 
 
 def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -> None:
+    """Add a PyVista mesh in the colours of its values, and a colour bar; `look` is what `_options_of` returns."""
     bar = {"title": "signed distance", "n_labels": 5, "fmt": "%.3g"}
     limits = (-look["reach"], look["reach"])
     plotter.add_mesh(
@@ -94,7 +104,7 @@ def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -
 
 
 def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
-    """Add isolines, and a heavier line at zero."""
+    """Add the isolines of the values of a PyVista mesh, and a heavier line at zero."""
     for levels, width in ((look["levels"], 1.0), ([0.0] if look["zero"] else [], 4.0)):
         lines = mesh.contour(list(levels), scalars=VALUES_NAME) if len(levels) else None
         if lines is not None and lines.n_points:
@@ -110,7 +120,7 @@ def _add_zero_set(plotter: Any, field: Any) -> None:
 
 
 def _add_section(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
-    """Add the section across y through the middle of the box."""
+    """Add the section of a PyVista mesh with the plane normal to y through its middle, and the box around it."""
     plotter.add_mesh(mesh.outline(), color=LINE)
     section = mesh.slice(normal="y")
     _add_colors(plotter, section, look, lighting=False)
