@@ -38,7 +38,7 @@ from .shapes.foreign import as_list, as_shape, converted
 from .shapes.kinds import Domain, Polylines, Shapes, Source, Sources, SurfaceDomain
 from .shapes.transforms import concatenated
 from .solids.completion import complete
-from .solids.contouring import CONTOUR_PLACES, sharp_surface
+from .solids.contouring import CONTOUR_POINTS, sharp_surface
 from .solids.extrusion import extrude
 from .solids.gauss import Pieces, sampled
 from .solids.implicit_surfaces import contour
@@ -409,7 +409,7 @@ def offset(
     reach: float | Reach
     if callable(distance):
         reach = checked_reach(distance)
-        between = sampled(Pieces(solid.triangles, np.zeros(len(solid.triangles), dtype=np.int64)), CONTOUR_PLACES)[1]
+        between = sampled(Pieces(solid.triangles, np.zeros(len(solid.triangles), dtype=np.int64)), CONTOUR_POINTS)[1]
         largest = float(reach(np.concatenate([solid.triangles.reshape(-1, 3), between])).max())
     elif (values := numbers(distance, "distance", SignedHeatError)).ndim:
         reach, largest = checked_reach(_linear(shape, values)), float(values.max(initial=0.0))

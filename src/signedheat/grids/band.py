@@ -72,6 +72,7 @@ class Band(Grid[Literal[3]]):
 
     @property
     def _values_shape(self) -> tuple[int, ...]:
+        """A field has (n, 8, 8, 8) values, those of the blocks."""
         return (len(self.blocks), BLOCK, BLOCK, BLOCK)
 
     def _checked(self, values: object) -> NDArray[Any]:
@@ -80,15 +81,18 @@ class Band(Grid[Literal[3]]):
         return array if array.shape == self._values_shape else super()._checked(values)
 
     def _interpolant(self, values: NDArray[Any], beyond: Exact | None) -> BandInterpolant:
+        """Return the function that interpolates (n, 8, 8, 8) values, and calls `beyond` at points off the band."""
         return BandInterpolant(self, values, beyond)
 
     def _level_set(self, values: NDArray[Any], level: float, exact: Exact | None) -> TriangleMesh:
+        """Extract a level set of (n, 8, 8, 8) values as a closed mesh; vertices are moved onto the level of `exact`."""
         vertices, faces = (np.concatenate(part) for part in zip(*self._level_parts(values, level, exact), strict=True))
         if exact is not None:
             faces = flipped_along_creases(vertices, faces)
         return TriangleMesh(vertices, faces)
 
     def _level_parts(self, values: NDArray[Any], level: float, exact: Exact | None) -> Iterator[tuple[Floats, Ints]]:
+        """Yield (n, 3) vertices and (m, 3) faces of the level set, window by window."""
         if abs(level) > self.width:
             raise OutsideError(
                 f"level {level:g} lies outside the band, which reaches to {self.width:g}",
@@ -100,6 +104,7 @@ class Band(Grid[Literal[3]]):
         return ((self._placed(points, nodes, level, exact), faces) for points, faces in parts)
 
     def _expanded(self, values: NDArray[Any], beyond: Exact | None) -> tuple[FieldDomain, NDArray[Any]]:
+        """Return the whole grid, and values on it: those of the band, and of `beyond` elsewhere."""
         assert beyond is not None
         whole = np.empty(self.shape)
         for i, x in enumerate(self.axes[0]):  # plane by plane, in bounded memory
@@ -111,9 +116,11 @@ class Band(Grid[Literal[3]]):
         return self.grid, whole
 
     def _stretched(self, factor: float) -> Self:
+        """Return the band for values multiplied by a factor, whose width is multiplied, too."""
         return self if abs(factor) == 1 else type(self)(self.grid, self.blocks, abs(factor) * self.width)
 
     def _shared(self, other: FieldDomain) -> Self:
+        """Return the band of a combination of fields on this band and another one; raise if their nodes differ."""
         super()._shared(other)
         assert isinstance(other, Band)
         if not np.array_equal(self.blocks.places, other.blocks.places):
@@ -132,6 +139,7 @@ class BandInterpolant(GridInterpolant):
     beyond: Exact | None
 
     def _between(self, points: Floats) -> Floats:
+        """(n,) values at (n, 3) points within the box; those of `beyond`, if any, where a node around has no value."""
         index = (points - self.grid.origin) / self.grid.spacing
         values = BlockValues(self.grid.blocks, self.values).interpolated(index)
         outside = np.isnan(values)

@@ -268,6 +268,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
 
     @property
     def _values_shape(self) -> tuple[int, ...]:
+        """A field has one value for each node."""
         return self.shape
 
     def _interpolant(self, values: Floats, beyond: Exact | None) -> GridInterpolant:
@@ -280,6 +281,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         return np.clip(places, self.origin, self.upper).reshape(*shape, self.dimension)
 
     def _level_set(self, values: Floats, level: float, exact: Exact | None) -> TriangleMesh | list[Polyline]:
+        """Extract a level set of values at nodes, as a closed mesh in space, or as lines in the plane."""
         if self.dimension == 2:
             lines = level_lines(values, self.spacing, level)
             return [Polyline(self._placed(points, values, level, exact), closed) for points, closed in lines]
@@ -296,9 +298,11 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         return on_level(exact, points, values, self.origin, self.spacing, level)
 
     def _values_at_walls(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the values at the nodes on the walls of the box."""
         return values_at_walls(values)
 
     def _shared(self, other: FieldDomain) -> Self:
+        """Return this grid if the other one has the same nodes up to rounding; raise otherwise."""
         if not isinstance(other, Grid):
             return super()._shared(other)
         if type(self) is not type(other):
@@ -343,6 +347,7 @@ class GridInterpolant:
         return shaped(slopes, shape)
 
     def _into_box(self, points: Floats) -> Floats:
+        """(n, d) nearest points of the grid's box."""
         return np.clip(points, self.grid.origin, self.grid.upper)
 
     def _values_at(self, points: Floats) -> tuple[Floats]:

@@ -81,6 +81,7 @@ def fitting_spacing(
     per_node = whole / grid.n_nodes
 
     def needed() -> float:
+        """Return the estimated bytes with the present spacing."""
         nodes = float(np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1))
         return per_node * nodes + bytes_of_area(area, spacing, nodes) + base
 
@@ -280,10 +281,12 @@ class GridIntegration(SolvesEach):
         free = Levels(np.zeros_like(levels.values), levels.groups)
 
         def spread(at_samples: Floats) -> Floats:
+            """Return values at the samples, weighted, at the nodes: the transpose of interpolation."""
             at_nodes: Floats = rows.T @ (weights * at_samples)
             return at_nodes.reshape(self.grid.shape)
 
         def apply(phi: Floats) -> Floats:
+            """Multiply the matrix of the minimisation by values at the nodes, flattened."""
             pull = strength * deviation(rows @ phi, source, free)
             return (laplacian(phi.reshape(self.grid.shape), self.grid.spacing) + spread(pull)).ravel()
 
@@ -291,6 +294,7 @@ class GridIntegration(SolvesEach):
         constant = max(strength, LEAST_PENALTY * self.soft_weight) * float(weights.sum()) / self.grid.n_nodes
 
         def precondition(residual: Floats) -> Floats:
+            """Multiply a residual by the inverse of C, and its mean by that of the penalty."""
             inverse = solve_poisson(residual.reshape(self.grid.shape), self.grid.spacing)
             result: Floats = inverse + residual.mean() / constant
             return result.ravel()

@@ -40,16 +40,16 @@ ALONG_A_CURVE = np.stack(
 """(512, 3) nodes of a block along a space-filling curve."""
 
 
-def nearest_at_nodes(tree: FaceTree, lattice: Lattice, first: Ints, places: Ints) -> tuple[Floats, NDArray[np.int32]]:
+def nearest_at_nodes(tree: FaceTree, lattice: Lattice, first: Ints, blocks: Ints) -> tuple[Floats, NDArray[np.int32]]:
     """Return (a, b, c) squared distances and nearest faces of the nodes of blocks, from node `first` on.
 
-    `places` are the (n, 3) indices of blocks. At nodes that are in none of them, values are NaN and −1.
+    `blocks` are the (n, 3) indices of blocks. At nodes that are in none of them, values are NaN and −1.
     """
     origin, steps, limits = lattice
-    shape = tuple(np.minimum((places.max(axis=0) + 1) * BLOCK, limits) - first)
+    shape = tuple(np.minimum((blocks.max(axis=0) + 1) * BLOCK, limits) - first)
     squares, faces = np.full(shape, np.nan), np.full(shape, -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
-    firsts = BLOCK * places[np.argsort(morton_codes(places.astype(np.float64)), kind="stable")]
+    firsts = BLOCK * blocks[np.argsort(morton_codes(blocks.astype(np.float64)), kind="stable")]
     last = np.minimum(firsts + BLOCK, limits) - 1
     near, _ = tree.nearest(origin + 0.5 * (firsts + last) * steps)
     crowded = _fill(*boxes, *lattice, firsts, near, first, EIGHTHS, squares, faces)
@@ -86,7 +86,7 @@ def _fill(
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = BOXES_PER_LEAF * min(CROWDED_LEAVES, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
-    places, best, which = np.empty((3, parts)), np.empty(parts), np.empty(parts, dtype=np.int64)
+    centres, best, which = np.empty((3, parts)), np.empty(parts), np.empty(parts, dtype=np.int64)
     away, box, near = np.empty((most, 4, parts)), np.empty(9), np.empty(CROWDED_LEAVES, dtype=np.int64)
     stack, cubes = np.empty(64, dtype=np.int64), np.empty((3 * parts, 5), dtype=np.int64)
     crowded = np.zeros(len(firsts), dtype=np.bool_)
@@ -114,10 +114,10 @@ def _fill(
             i, j, k, level, slot = cubes[depth]
             side = BLOCK >> level + 1
             for e in range(parts):
-                places[0, e] = origin[0] + (i + side * eighths[0, e] + 0.5 * (side - 1)) * steps[0]
-                places[1, e] = origin[1] + (j + side * eighths[1, e] + 0.5 * (side - 1)) * steps[1]
-                places[2, e] = origin[2] + (k + side * eighths[2, e] + 0.5 * (side - 1)) * steps[2]
-            _nearest(rows, faces[level, slot], counts[level, slot], places, away, best, which)
+                centres[0, e] = origin[0] + (i + side * eighths[0, e] + 0.5 * (side - 1)) * steps[0]
+                centres[1, e] = origin[1] + (j + side * eighths[1, e] + 0.5 * (side - 1)) * steps[1]
+                centres[2, e] = origin[2] + (k + side * eighths[2, e] + 0.5 * (side - 1)) * steps[2]
+            _nearest(rows, faces[level, slot], counts[level, slot], centres, away, best, which)
             if side > 1:
                 candidates, n = faces[level, slot], counts[level, slot]
                 _divide(candidates, n, away, best, which, 0.5 * (side - 1) * steps, faces[level + 1], counts[level + 1])
@@ -136,7 +136,7 @@ def _fill(
 
 @compiled
 def _nearest(
-    rows: Floats, faces: NDArray[np.int32], count: int, places: Floats, away: Floats, best: Floats, which: Ints
+    rows: Floats, faces: NDArray[np.int32], count: int, points: Floats, away: Floats, best: Floats, which: Ints
 ) -> None:
     """Find the nearest of `count` faces for each of (3, e) places.
 
@@ -146,7 +146,7 @@ def _nearest(
     for e in range(len(best)):
         best[e], which[e] = np.inf, 0
     for c in range(count):
-        away_from_triangle(rows, np.int64(faces[c]), places, c, away)
+        away_from_triangle(rows, np.int64(faces[c]), points, c, away)
         for e in range(len(best)):
             nearer = away[c, 0, e] < best[e]
             best[e] = away[c, 0, e] if nearer else best[e]

@@ -151,6 +151,7 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
+    """Measure the distance of every node to the zero set of values, and their sides."""
     distances = run_cancellable(lambda: redistance(values, grid.spacing), report)
     return Nearest(np.abs(distances), np.sign(distances).astype(np.int64))
 
@@ -206,7 +207,7 @@ TILE_NODES = (4 * BLOCK) ** 3
 class Crossings(NamedTuple):
     """Points of the zero set of the cubic interpolant near crossed edges, with its normals and curvatures there."""
 
-    places: Floats  # (c, 4) positions
+    positions: Floats  # (c, 4)
     normals: Floats  # (c, 4) unit normals
     bends: Floats  # (c, 4, 4) symmetric shape operators
 
@@ -250,9 +251,9 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     zeros = np.argwhere((field == 0) & ~scipy.ndimage.binary_dilation(field < 0, around)) * steps
     if values.ndim == 4:
         curved = Crossings(*crossings_at(field, crossed_edges(field), steps))
-        smooth, none = np.ones(len(curved.places), dtype=np.bool_), np.empty((0, 3))
+        smooth, none = np.ones(len(curved.positions), dtype=np.bool_), np.empty((0, 3))
         ids = none.astype(np.int64)
-        return Contour(none, ids, ids[:, 0], zeros, curved, curved.places, smooth, 0.0, reach)
+        return Contour(none, ids, ids[:, 0], zeros, curved, curved.positions, smooth, 0.0, reach)
     vertices, faces, edges, first, numbers = _marched(values)
     vertices *= steps[1:]
     curved = Crossings(*crossings_at(field, edges, steps))
@@ -263,7 +264,7 @@ def zero_contour(values: Floats, steps: Floats) -> Contour:
     uneven = _unevenness(curved, linear, pairs[(pairs >= 0).all(axis=1)])
     least = SMOOTH_CROSSING * float(steps[unused:].min())
     smooth = uneven <= least
-    points = np.where(smooth[:, None], curved.places, linear)
+    points = np.where(smooth[:, None], curved.positions, linear)
     return Contour(vertices, faces, numbers, zeros, curved, points, smooth, least, reach)
 
 
@@ -277,12 +278,13 @@ def distances_to(contour: Contour, origin: Floats, steps: Floats, shape: Ints) -
     measured = _to_triangles(contour, origin, steps, shape) if len(contour.faces) else _to_crossings(contour)
 
     def measure(first: Ints) -> None:
+        """Write the distances of the tile that begins at node `first`."""
         stop = np.minimum(first + side, shape)
         axes = [np.arange(*ends) for ends in zip(first, stop, strict=True)]
-        places = origin + np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 4) * steps
-        near = measured(first, stop, places)
+        nodes = origin + np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 4) * steps
+        near = measured(first, stop, nodes)
         if len(contour.zeros):
-            near = np.minimum(near, zeros.query(places)[0])
+            near = np.minimum(near, zeros.query(nodes)[0])
         distances[np.ix_(*axes)] = near.reshape(stop - first)
 
     firsts = np.meshgrid(*(np.arange(0, n, side) for n in shape), indexing="ij")
@@ -297,13 +299,14 @@ def _to_triangles(contour: Contour, origin: Floats, steps: Floats, shape: Ints) 
     _ = tree.discs  # before threads compute them twice
     lattice = Lattice(origin[1:], steps[1:], shape[1:])
 
-    def measured(first: Ints, stop: Ints, places: Floats) -> Floats:
+    def measured(first: Ints, stop: Ints, nodes: Floats) -> Floats:
+        """(n,) distances of a tile, see `Measured`."""
         if (shape[1:] > 1).all():
             blocks = np.stack(np.meshgrid(*map(np.arange, (first // BLOCK)[1:], -(-stop // BLOCK)[1:])), axis=-1)
             squares, faces = nearest_at_nodes(tree, lattice, first[1:], blocks.reshape(-1, 3))
         else:  # blocks of a plane are nearly empty
-            faces, squares = tree.nearest(np.ascontiguousarray(places[:, 1:]))
-        return _around(contour, corners[faces.ravel()], np.sqrt(squares.ravel()), places)
+            faces, squares = tree.nearest(np.ascontiguousarray(nodes[:, 1:]))
+        return _around(contour, corners[faces.ravel()], np.sqrt(squares.ravel()), nodes)
 
     return measured
 
@@ -312,54 +315,55 @@ def _to_crossings(contour: Contour) -> Measured:
     """Return a function that measures distance from tiles of a grid with four axes to crossings, ∞ without any."""
     crossings = PointTree(contour.points)
 
-    def measured(first: Ints, stop: Ints, places: Floats) -> Floats:
+    def measured(first: Ints, stop: Ints, nodes: Floats) -> Floats:
+        """(n,) distances of a tile, see `Measured`."""
         if not len(contour.points):
-            return np.full(len(places), np.inf)
-        return _around_crossings(contour, crossings.query(places)[1], places)
+            return np.full(len(nodes), np.inf)
+        return _around_crossings(contour, crossings.query(nodes)[1], nodes)
 
     return measured
 
 
-def _around(contour: Contour, corners: Ints, distances: Floats, places: Floats) -> Floats:
-    """(n,) distances of (n, 4) places, given those to the nearest triangles, whose corners are (n, 3) crossings.
+def _around(contour: Contour, corners: Ints, distances: Floats, nodes: Floats) -> Floats:
+    """(n,) distances of (n, 4) nodes, given those to the nearest triangles, whose corners are (n, 3) crossings.
 
     Where the nearest corner is smooth, distance is to its circle instead, at most `uneven` nearer or farther.
     """
-    crossings = _nearest_corners(contour.points, corners, places)
+    crossings = _nearest_corners(contour.points, corners, nodes)
     rows = np.flatnonzero((crossings >= 0) & contour.smooth[crossings])
-    curved = circle_distances(contour, crossings[rows], places[rows])
+    curved = circle_distances(contour, crossings[rows], nodes[rows])
     low, high = distances[rows] - contour.uneven, distances[rows] + contour.uneven
     distances[rows] = np.minimum(np.maximum(curved, low), high)
     return distances
 
 
-def _around_crossings(contour: Contour, crossings: Ints, places: Floats) -> Floats:
-    """(n,) distances of (n, 4) places to the touching circles at the nearest crossings, or discs if not smooth."""
-    away = places - contour.curved.places[crossings]
+def _around_crossings(contour: Contour, crossings: Ints, nodes: Floats) -> Floats:
+    """(n,) distances of (n, 4) nodes to the touching circles at the nearest crossings, or discs if not smooth."""
+    away = nodes - contour.curved.positions[crossings]
     heights = contour.curved.heights(crossings, away)
     across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
     flat = np.hypot(heights, np.maximum(across - FLAT_RADIUS * contour.reach, 0.0))
-    return np.where(contour.smooth[crossings], circle_distances(contour, crossings, places), flat)
+    return np.where(contour.smooth[crossings], circle_distances(contour, crossings, nodes), flat)
 
 
-def circle_distances(contour: Contour, crossings: Ints, places: Floats) -> Floats:
-    """(n,) distances of (n, 4) places to circles that touch the zero set at (n,) crossings and are as curved."""
-    return _circle_distances(*contour.curved, contour.reach, crossings, places)
+def circle_distances(contour: Contour, crossings: Ints, nodes: Floats) -> Floats:
+    """(n,) distances of (n, 4) nodes to circles that touch the zero set at (n,) crossings and are as curved."""
+    return _circle_distances(*contour.curved, contour.reach, crossings, nodes)
 
 
 @compiled
-def _nearest_corners(points: Floats, corners: Ints, places: Floats) -> Ints:
-    """(n,) the point that is nearest to each of (n, 4) places, of those in its row of (n, k) corners, or −1.
+def _nearest_corners(points: Floats, corners: Ints, nodes: Floats) -> Ints:
+    """(n,) the point that is nearest to each of (n, 4) nodes, of those in its row of (n, k) corners, or −1.
 
     A corner of −1 stands for none.
     """
-    chosen = np.full(len(places), -1)
-    for row in range(len(places)):
+    chosen = np.full(len(nodes), -1)
+    for row in range(len(nodes)):
         least = np.inf
         for k in range(corners.shape[1]):
             c, square = corners[row, k], 0.0
             for d in range(4):
-                square += (places[row, d] - points[c, d]) ** 2
+                square += (nodes[row, d] - points[c, d]) ** 2
             if c >= 0 and square < least:
                 least, chosen[row] = square, c
     return chosen
@@ -367,15 +371,15 @@ def _nearest_corners(points: Floats, corners: Ints, places: Floats) -> Ints:
 
 @compiled
 def _circle_distances(
-    points: Floats, normals: Floats, bends: Floats, reach: float, crossings: Ints, places: Floats
+    points: Floats, normals: Floats, bends: Floats, reach: float, crossings: Ints, nodes: Floats
 ) -> Floats:
     """Compute `circle_distances`, given the arrays of `Crossings`."""
-    distances, away, across = np.empty(len(places)), np.empty(4), np.empty(4)
-    for row in range(len(places)):
+    distances, away, across = np.empty(len(nodes)), np.empty(4), np.empty(4)
+    for row in range(len(nodes)):
         c = crossings[row]
         height, square, aside, bend = 0.0, 0.0, 0.0, 0.0
         for d in range(4):
-            away[d] = places[row, d] - points[c, d]
+            away[d] = nodes[row, d] - points[c, d]
             height += away[d] * normals[c, d]
             square += away[d] * away[d]
         for d in range(4):
@@ -443,9 +447,9 @@ def _unevenness(curved: Crossings, linear: Floats, pairs: Ints) -> Floats:
 
     `pairs` are (p, 2) neighbouring crossings.
     """
-    uneven: Floats = np.linalg.norm(curved.places - linear, axis=1)
+    uneven: Floats = np.linalg.norm(curved.positions - linear, axis=1)
     crossing, neighbor = np.concatenate([pairs, pairs[:, ::-1]]).T
-    away = curved.places[neighbor] - curved.places[crossing]
+    away = curved.positions[neighbor] - curved.positions[crossing]
     heights = curved.heights(crossing, away) + 0.5 * curved.bend_along(crossing, away)
     np.maximum.at(uneven, crossing, np.abs(heights))
     return uneven
@@ -459,7 +463,7 @@ def crossed_edges(field: Floats) -> NDArray[np.int32]:
 
 
 @compiled
-def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> float:
+def _cubic(field: Floats, position: Floats, weights: Floats, gradient: Floats) -> float:
     """Return the cubic convolution interpolant (Keys 1981) at a place, (4,) in cells; write its gradient.
 
     `weights`, (2, 4, 4), is working memory.
@@ -467,8 +471,8 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):
         n = field.shape[axis]
-        base[axis] = min(max(np.int64(np.floor(place[axis])), 0), max(n - 2, 0))
-        f = place[axis] - base[axis]
+        base[axis] = min(max(np.int64(np.floor(position[axis])), 0), max(n - 2, 0))
+        f = position[axis] - base[axis]
         g = 1.0 - f
         for side in range(2):  # weights of the value, and of the derivative
             if n == 1:
@@ -517,9 +521,9 @@ def _cubic(field: Floats, place: Floats, weights: Floats, gradient: Floats) -> f
 def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats, Floats]:
     """Return the attributes of `Crossings` for (e, 5) crossed edges of a field with four axes."""
     n = len(edges)
-    places, normals, bends = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4, 4))
+    positions, normals, bends = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4, 4))
     weights = np.empty((2, 4, 4))
-    slope, start, place, ahead, behind = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
+    slope, start, position, ahead, behind = np.empty(4), np.empty(4), np.empty(4), np.empty(4), np.empty(4)
     bend = np.empty((4, 4))
     for e in range(len(edges)):
         axis = edges[e, 4]
@@ -530,25 +534,25 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tupl
             start[d] = edges[e, d]
         start[axis] += tail_value / (tail_value - head_value)
         for d in range(4):
-            place[d] = start[d]
+            position[d] = start[d]
         # Newton's method along the gradient, onto the zero set of the interpolant; back to the crossing if it diverges
         for _ in range(3):
-            value = _cubic(field, place, weights, slope)
+            value = _cubic(field, position, weights, slope)
             square, moved = 0.0, 0.0
             for d in range(4):
                 slope[d] /= steps[d]
                 square += slope[d] ** 2
             for d in range(4):
                 if square > 0.0:
-                    place[d] -= value * slope[d] / (square * steps[d])
-                moved = max(moved, abs(place[d] - start[d]))
-                if place[d] < 0.0 or place[d] > field.shape[d] - 1:
+                    position[d] -= value * slope[d] / (square * steps[d])
+                moved = max(moved, abs(position[d] - start[d]))
+                if position[d] < 0.0 or position[d] > field.shape[d] - 1:
                     moved = 2.0
             if not moved < 1.0:
                 for d in range(4):
-                    place[d] = start[d]
+                    position[d] = start[d]
                 break
-        _cubic(field, place, weights, slope)
+        _cubic(field, position, weights, slope)
         square = 0.0
         for d in range(4):
             slope[d] /= steps[d]
@@ -558,15 +562,15 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tupl
             slope[axis] = 1.0 if head_value > tail_value else -1.0
             length = 1.0
         for d in range(4):
-            places[e, d] = place[d] * steps[d]
+            positions[e, d] = position[d] * steps[d]
             normals[e, d] = slope[d] / length
         # differences of the gradient one cell apart
         for d in range(4):
             for f in range(4):
-                ahead[f] = behind[f] = place[f]
+                ahead[f] = behind[f] = position[f]
                 bend[d, f] = 0.0
-            ahead[d] = min(place[d] + 1.0, field.shape[d] - 1.0)
-            behind[d] = max(place[d] - 1.0, 0.0)
+            ahead[d] = min(position[d] + 1.0, field.shape[d] - 1.0)
+            behind[d] = max(position[d] - 1.0, 0.0)
             span = (ahead[d] - behind[d]) * steps[d] * length
             if span > 0.0:
                 _cubic(field, ahead, weights, slope)
@@ -578,4 +582,4 @@ def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tupl
         for d in range(4):
             for f in range(4):
                 bends[e, d, f] = 0.5 * (bend[d, f] + bend[f, d])
-    return places, normals, bends
+    return positions, normals, bends

@@ -373,7 +373,7 @@ def open_bounding(
             whole = replace(whole, within=within)
             weights = whole.weights(fixed, weights)
     elif len(closed):
-        around = WindingTree.of(closed).levels(whole.places, whole.normals, whole.areas)
+        around = WindingTree.of(closed).levels(whole.points, whole.normals, whole.areas)
         whole = replace(whole, within=-around)
     while alive.any():
         names, system = np.flatnonzero(alive), whole.chosen(alive)

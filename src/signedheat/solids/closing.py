@@ -255,6 +255,7 @@ def _least_bent(
 
 @compiled
 def _length(a: Floats, b: Floats) -> float:
+    """Distance between two points, (3,) each."""
     return float(np.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2))
 
 

@@ -104,7 +104,7 @@ With 0.5 distance to balls, tori and ducks without three tenths of their triangl
 MOSTLY_GIVEN = 0.25
 """If more than this share of the surface is completed, there is a warning."""
 
-CLEAR_WINDING, EVIDENCE_PLACES = 0.9, 1000
+CLEAR_WINDING, EVIDENCE_POINTS = 0.9, 1000
 """Winding numbers of faces above the first, or below one minus this, are clear evidence of what is inside. They are
 evaluated at as many random points in the box of a solid as the second says."""
 MOST_OVERRULED = 0.02
@@ -433,7 +433,7 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
 def overruled(solid: Solid, triangles: Floats) -> float:
     """Return the share of the box of a solid in which winding numbers of (m, 3, 3) faces clearly contradict it."""
     lower, upper = solid.bounds
-    points = lower + np.random.default_rng(0).random((EVIDENCE_PLACES, 3)) * (upper - lower)
+    points = lower + np.random.default_rng(0).random((EVIDENCE_POINTS, 3)) * (upper - lower)
     windings, inside = WindingTree.of(triangles).numbers(points), solid.inside(points)
     return float(np.where(inside, windings < 1 - CLEAR_WINDING, windings > CLEAR_WINDING).mean())
 

@@ -163,8 +163,8 @@ def placed(offset: ImplicitSurface, grid: Grid, cells: DualCells, points: Floats
         edges, pieces = (part[begin : begin + CELLS_AT_ONCE] for part in (cells.edges, cells.pieces))
         first, stop = np.searchsorted(cells.owners, [begin, begin + CELLS_AT_ONCE])
         used, crossed = np.unique(edges[edges >= 0], return_inverse=True)  # each edge is in four cells
-        places, owners = cells.places[cells.owners[first:stop]], pieces[edges >= 0] - first
-        parts = _vertices(offset, grid, places, alone[first:stop], owners, crossed, points[used])
+        piece_cells, owners = cells.places[cells.owners[first:stop]], pieces[edges >= 0] - first
+        parts = _vertices(offset, grid, piece_cells, alone[first:stop], owners, crossed, points[used])
         for whole, part in zip((vertices, middles, wider), parts, strict=True):
             whole[first:stop] = (part - grid.origin) / grid.spacing
     chosen = _apart(cells, vertices, wider)
@@ -192,7 +192,7 @@ def _apart(cells: DualCells, vertices: Floats, wider: Floats) -> Bools:
 def _vertices(
     offset: ImplicitSurface,
     grid: Grid,
-    places: NDArray[np.int32],
+    cells: NDArray[np.int32],
     alone: Bools,
     owners: Ints,
     crossed: Ints,
@@ -200,13 +200,13 @@ def _vertices(
 ) -> tuple[Floats, Floats, Floats]:
     """Return (p, 3) vertices of pieces of the surface in their cells, middles of pieces, and wider candidates or NaN.
 
-    `places` are the (p, 3) cells of pieces, and `alone` tells whether a piece has its cell alone. Wider candidates lie
+    `cells` are the (p, 3) cells of pieces, and `alone` tells whether a piece has its cell alone. Wider candidates lie
     up to `OUTSIDE_CELL` outside of their cells. The surface crosses edge `crossed[i]` in piece `owners[i]`, and edge e
     at `points[e]`.
     """
-    count = len(places)
+    count = len(cells)
     step = float(grid.spacing.max())
-    corners = grid.origin + places * grid.spacing
+    corners = grid.origin + cells * grid.spacing
     room = CLEARANCE * grid.spacing
     lower, upper = corners + room, corners + grid.spacing - room
     middles = np.clip(
@@ -320,7 +320,7 @@ TOUCHING_CELLS = np.array(list(np.ndindex(3, 3, 3))) - 1
 """(27, 3) offsets of a cell and of those that touch it."""
 IN_BLOCK = np.array(list(np.ndindex(BLOCK, BLOCK, BLOCK)))
 """(512, 3) offsets of the nodes of a block."""
-CONTOUR_PLACES = 4096
+CONTOUR_POINTS = 4096
 """Number of points on a surface near which vertices of its contour are looked for, besides one for each part."""
 STEEPEST_HEIGHT = 2.0
 """Blocks near a surface are found from coarse to fine as if heights above it had this slope at most. Distance has slope
@@ -334,11 +334,12 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
     level = offset.level
 
     def solve(rows: Ints) -> Ints:
-        places = blocks.places[rows].astype(np.int64)
+        """Write the heights at the nodes of the blocks with these row numbers; return them."""
+        indices = blocks.places[rows].astype(np.int64)
         if level is not None:
-            values[rows] = solved(tree, windings, grid, places)[0].astype(np.float64) - level
+            values[rows] = solved(tree, windings, grid, indices)[0].astype(np.float64) - level
             return rows
-        nodes = (BLOCK * places[:, None] + IN_BLOCK).reshape(-1, 3)
+        nodes = (BLOCK * indices[:, None] + IN_BLOCK).reshape(-1, 3)
         heights = offset.distance(grid.origin + nodes * grid.spacing)
         heights[(nodes >= grid.shape).any(axis=1)] = np.nan
         values[rows] = heights.reshape(-1, BLOCK, BLOCK, BLOCK)
@@ -382,6 +383,7 @@ def traced(
     """
 
     def inside(nodes: Floats) -> Bools:
+        """(k,) whether (k, 3) positions, in cells, are inside the surface."""
         return offset.distance(grid.origin + nodes * grid.spacing) < 0
 
     cells = dual_cells(crossings, around, grid.shape, inside)
@@ -419,18 +421,18 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
     if not len(faces):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=bool)
     parts = element_components(features.faces[faces].astype(np.int64))
-    chosen, bases = sampled(Pieces(features.corners[faces].reshape(-1, 3, 3), parts), CONTOUR_PLACES)
+    chosen, bases = sampled(Pieces(features.corners[faces].reshape(-1, 3, 3), parts), CONTOUR_POINTS)
     reach = offset.reach(bases) if callable(offset.reach) else np.full(len(bases), offset.reach)
     moves = reach[:, None] * features.face_normals[faces[chosen]]
-    places, parts = np.concatenate([bases + moves, bases - moves]), np.tile(parts[chosen], 2)
-    cells = np.floor((places - grid.origin) / grid.spacing).astype(np.int64)
+    on_offset, parts = np.concatenate([bases + moves, bases - moves]), np.tile(parts[chosen], 2)
+    cells = np.floor((on_offset - grid.origin) / grid.spacing).astype(np.int64)
     on_surface = ((cells >= 0) & (cells < np.array(grid.shape) - 1)).all(axis=1)
     if moved:
-        on_surface &= np.abs(offset.distance(places)) < 1e-3 * float(grid.spacing.min())
+        on_surface &= np.abs(offset.distance(on_offset)) < 1e-3 * float(grid.spacing.min())
     size = np.array(grid.shape) + 2
     filled = np.floor((vertices - grid.origin) / grid.spacing).astype(np.int64) + 1
     around = (cells[on_surface, None] + TOUCHING_CELLS + 1).reshape(-1, 3)
-    keys, occupied = (np.ravel_multi_index(tuple(places.T), size, "clip") for places in (around, filled))
+    keys, occupied = (np.ravel_multi_index(tuple(indices.T), size, "clip") for indices in (around, filled))
     near = places_among(np.sort(occupied), keys) >= 0
     lost = np.asarray(~near.reshape(-1, len(TOUCHING_CELLS)).any(axis=1))
     return parts[on_surface], lost
@@ -438,10 +440,10 @@ def _lost(offset: Offset, grid: Grid, vertices: Floats) -> tuple[Ints, Bools]:
 
 def _crossed_near(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, CrossedCells]:
     """Compute heights near a surface, the edges that it crosses and the cells around, adding blocks as needed."""
-    places = blocks_at(offset, grid)
-    done = BlockValues(Blocks.of(places[:0], grid.shape), np.empty((0, BLOCK, BLOCK, BLOCK), dtype=np.float32))
-    while len(places):
-        new = block_heights(offset, grid, Blocks.of(places, grid.shape))
+    indices = blocks_at(offset, grid)
+    done = BlockValues(Blocks.of(indices[:0], grid.shape), np.empty((0, BLOCK, BLOCK, BLOCK), dtype=np.float32))
+    while len(indices):
+        new = block_heights(offset, grid, Blocks.of(indices, grid.shape))
         both = Blocks.of(np.concatenate([done.blocks.places, new.blocks.places]), grid.shape)
         merged = np.empty((len(both), BLOCK, BLOCK, BLOCK), dtype=np.float32)
         for part in (done, new):
@@ -451,8 +453,8 @@ def _crossed_near(offset: Offset, grid: Grid) -> tuple[BlockValues, Crossings, C
         refuse_large_contour(crossings, grid)
         cells = crossed_cells(crossings, grid.shape)
         around = cells.places[open_cells(cells.edges)][:, None] + np.array(list(np.ndindex(2, 2, 2)))
-        places = np.unique(around.reshape(-1, 3) // BLOCK, axis=0)
-        places = places[both.rows(places) < 0]
+        indices = np.unique(around.reshape(-1, 3) // BLOCK, axis=0)
+        indices = indices[both.rows(indices) < 0]
     return done, crossings, cells
 
 
@@ -484,19 +486,22 @@ def blocks_at(offset: Offset, grid: Grid) -> Ints:
     diagonal = (1.0 if offset.level is not None else STEEPEST_HEIGHT) * float(np.linalg.norm(grid.spacing))
 
     def near(centres: Floats, half: float) -> Bools:
+        """(k,) whether cubes of the grid with (k, 3) centres may contain a part of the surface."""
         return np.abs(offset.distance(centres)) <= (half + 1.0) * diagonal
 
     free = available_memory()
-    places, times = blocks_where(grid, near, math.inf if free is None else max(free - libraries(), 0) / BYTES_PER_BLOCK)
+    indices, times = blocks_where(
+        grid, near, math.inf if free is None else max(free - libraries(), 0) / BYTES_PER_BLOCK
+    )
     if times > 1:
         cell = float(grid.spacing.max())
         raise MemoryLimitError(
             f"a surface in cells of {cell:.3g} needs more than the {(free or 0) / 1e9:.2g} GB that are free",
             remedy=f"use a spacing of {1.5 * times * cell:.3g}",
         )
-    if not len(places):
+    if not len(indices):
         raise OutsideError(f"the distance reaches {offset.named} nowhere on the grid", remedy="choose another level")
-    return places
+    return indices
 
 
 def crossed_edges(band: BlockValues) -> Crossings:

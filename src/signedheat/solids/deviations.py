@@ -36,7 +36,7 @@ HISTOGRAM_BINS = 40
 """Default number of bins of histograms."""
 OPEN_SHARE = 0.25
 """A nominal part counts as an open surface if a larger share of its surface is completed."""
-WORST_PLACES = 0.05
+WORST_SPACING = 0.05
 """Least distance between the points that `Deviation.worst` returns, relative to the diagonal of the scan's box."""
 STRAIGHT_ABOVE = 1 - 1e-6
 """A point is straight above or below the nearest point of the part if the cosine to the normal is larger than this."""
@@ -221,7 +221,7 @@ class Deviation(Frozen):
         (3, True)
         """
         ids = self._ids[np.argsort(-np.abs(self.of_surface), kind="stable")]
-        reach = WORST_PLACES * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
+        reach = WORST_SPACING * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
         chosen: list[int] = []
         while len(ids) and len(chosen) < n:
             chosen.append(int(ids[0]))

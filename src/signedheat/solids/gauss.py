@@ -44,7 +44,7 @@ PLANE_AGREEMENT = 1.0
 """μ: weight of neighbours that lie in one plane."""
 PLANE_NEIGHBORS = 12
 """Number of nearest samples that each sample is compared with in the second term."""
-LEVEL_PLACES = 10_000
+LEVEL_POINTS = 10_000
 """Largest number of points at which the level is sampled, besides one on each piece."""
 LOOSE_DIPOLES = 64
 """More loose triangles than this become dipoles; fewer get exact solid angles, by which noise is recognized."""
@@ -57,7 +57,7 @@ SLENDER_TRIANGLE = 12.0
 dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
-PLACES_TOGETHER = 16
+POINTS_TOGETHER = 16
 """Number of neighbouring points for which dipoles are summed together. Eight take a fifth longer, 32 as long."""
 WEIGHT_TOLERANCE = 0.02
 """Relative residual up to which the weights of dipoles are solved for. With half of it noisy loose faces take a quarter
@@ -115,7 +115,7 @@ class Matrix:
     """Matrix W of k pieces at n sample points on them, by exact solid angles."""
 
     matrix: Floats  # (n, k) winding number of each piece at each sample; of the sample's own piece, mean of both sides
-    places: Floats  # (n, 3) sample points
+    points: Floats  # (n, 3) sample points
     normals: Floats  # (n, 3) unit normals at the samples
     owners: Ints  # (n,) piece that each sample is on
     areas: Floats  # (n,) part of the area of its piece that each sample stands for
@@ -124,7 +124,7 @@ class Matrix:
     @classmethod
     def of(cls, pieces: Pieces) -> Matrix:
         """Sample points on the pieces, and compute the winding number of each piece there."""
-        faces, places = sampled(pieces, min(LEVEL_PLACES, 5_000_000 // len(pieces.areas)))  # limits the size of W
+        faces, points = sampled(pieces, min(LEVEL_POINTS, 5_000_000 // len(pieces.areas)))  # limits the size of W
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
         triangles = pieces.triangles[order]
@@ -137,18 +137,18 @@ class Matrix:
         reaches = np.zeros(k)
         off = np.linalg.norm(pieces.triangles - centres[pieces.labels][:, None], axis=2).max(axis=1)
         np.maximum.at(reaches, pieces.labels, off)
-        matrix, balls = np.zeros((len(places), k)), np.c_[centres, reaches]
+        matrix, balls = np.zeros((len(points), k)), np.c_[centres, reaches]
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
-        _small_pieces(corners, starts, vectors, balls, places, rank[faces], matrix)
+        _small_pieces(corners, starts, vectors, balls, points, rank[faces], matrix)
         for piece in np.flatnonzero(np.diff(starts) > TREE_FACES):
             own, begin = owners == piece, starts[piece]
             tree = WindingTree.of(triangles[begin : starts[piece + 1]])
-            matrix[~own, piece] = tree.numbers(places[~own])
-            matrix[own, piece] = tree.behind(rank[faces[own]] - begin, places[own]) - 0.5
+            matrix[~own, piece] = tree.numbers(points[~own])
+            matrix[own, piece] = tree.behind(rank[faces[own]] - begin, points[own]) - 0.5
         counts = np.bincount(owners, minlength=k)
         normals = unit(area_vectors(pieces.triangles[faces]))
         areas = pieces.areas[owners] / counts[owners]
-        return cls(matrix, places, normals, owners, areas, within=np.zeros(len(owners)))
+        return cls(matrix, points, normals, owners, areas, within=np.zeros(len(owners)))
 
     def chosen(self, kept: Bools) -> Matrix:
         """Restrict the system to some of the pieces, which are renumbered."""
@@ -157,7 +157,7 @@ class Matrix:
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
         matrix = self.matrix[np.ix_(rows, kept)]
-        return Matrix(matrix, self.places[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
+        return Matrix(matrix, self.points[rows], self.normals[rows], owners, self.areas[rows], self.within[rows])
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
         """(k,) least-squares weights, whose signs orient the pieces; the (k,) `fixed` ones get the same weight ≥ 0.
@@ -169,7 +169,7 @@ class Matrix:
         sums = sparse.csr_array((np.ones(k), (np.arange(k), unknowns)))
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
-        normal += agreement(links_of(self.places, self.normals, self.owners), shares, self.owners).toarray()
+        normal += agreement(links_of(self.points, self.normals, self.owners), shares, self.owners).toarray()
         damping = np.bincount(self.owners, shares, k)
         normal[np.diag_indices_from(normal)] += WEIGHT_DAMPING * np.maximum(damping, LEAST_AREA_SHARE)
         right_side = weighted.T @ (0.5 + self.within)
@@ -222,7 +222,7 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     rows = np.searchsorted(ends, begins[owners] + share * (ends[lasts] - begins)[owners])
     firsts = np.concatenate([[0], lasts[:-1] + 1])
     faces = order[np.clip(rows, firsts[owners], lasts[owners])]
-    # several places on one face are spread over it; a single one is at its centre
+    # several points on one face are spread over it; a single one is at its centre
     same = np.concatenate([[False], faces[1:] == faces[:-1]])
     run = np.arange(len(faces)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(faces))))
     u, v = (1 / 3 + run * 0.7548776662466927) % 1.0, (1 / 3 + run * 0.5698402909980532) % 1.0
@@ -239,20 +239,20 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 
 @compiled
 def _small_pieces(
-    corners: Floats, starts: Ints, vectors: Floats, balls: Floats, places: Floats, own: Ints, matrix: Floats
+    corners: Floats, starts: Ints, vectors: Floats, balls: Floats, points: Floats, own: Ints, matrix: Floats
 ) -> None:
-    """Write winding numbers of pieces of at most `TREE_FACES` faces at (n, 3) places into the (n, k) matrix.
+    """Write winding numbers of pieces of at most `TREE_FACES` faces at (n, 3) points into the (n, k) matrix.
 
     `corners` are (m, 9), piece by piece from `starts`, (k + 1,). `vectors` are (k, 3) area vectors, and `balls` (k, 4)
-    centres and radii: at places beyond `PIECE_RADII` radii a piece is a dipole. `own` is the face each place is on.
+    centres and radii: at points beyond `PIECE_RADII` radii a piece is a dipole. `own` is the face each point is on.
     """
     for piece in range(len(starts) - 1):
         begin, end = starts[piece], starts[piece + 1]
         if end - begin > TREE_FACES:
             continue
         beyond = (PIECE_RADII * balls[piece, 3]) ** 2
-        for p in range(len(places)):
-            dx, dy, dz = balls[piece, 0] - places[p, 0], balls[piece, 1] - places[p, 1], balls[piece, 2] - places[p, 2]
+        for p in range(len(points)):
+            dx, dy, dz = balls[piece, 0] - points[p, 0], balls[piece, 1] - points[p, 1], balls[piece, 2] - points[p, 2]
             square = dx * dx + dy * dy + dz * dz
             if square > beyond:
                 flux = dx * vectors[piece, 0] + dy * vectors[piece, 1] + dz * vectors[piece, 2]
@@ -261,7 +261,7 @@ def _small_pieces(
             angle = 0.0
             for f in range(begin, end):
                 if f != own[p]:
-                    angle += mean_angle(corners, f, places[p, 0], places[p, 1], places[p, 2])
+                    angle += mean_angle(corners, f, points[p, 0], points[p, 1], points[p, 2])
             matrix[p, piece] = angle / (4.0 * np.pi)
 
 
@@ -281,7 +281,7 @@ class Links(NamedTuple):
 class Walk(NamedTuple):
     """A tree of dipoles, and the nodes by which their field is summed for each group of neighbouring dipoles."""
 
-    places: Floats  # (n, 3) positions of the dipoles
+    points: Floats  # (n, 3) positions of the dipoles
     softening: Floats  # (n,) see `Dipoles`
     items: Ints  # (leaves · `BOXES_PER_LEAF`,) the dipoles in each leaf; −1 where it has fewer
     balls: Floats  # (2 · leaves, 4) see `Dipoles.balls`
@@ -295,7 +295,7 @@ class Walk(NamedTuple):
 class Dipoles:
     """The map W of many small faces or points, as dipoles softened at the scale of the distance to neighbours."""
 
-    places: Floats  # (n, 3) positions of the dipoles, at which the level is sampled, too
+    points: Floats  # (n, 3) positions of the dipoles, at which the level is sampled, too
     normals: Floats  # (n, 3) unit normals
     areas: Floats  # (n,) area of each dipole
     owners: Ints  # (n,) piece that each dipole is part of
@@ -313,20 +313,20 @@ class Dipoles:
             kept = np.bincount(pieces.labels[faces], areas[faces], len(pieces.areas))
             areas = areas * (pieces.areas / np.maximum(kept, np.finfo(float).tiny))[pieces.labels]
         triangles = pieces.triangles[faces]
-        places = triangles.mean(axis=1)
+        points = triangles.mean(axis=1)
         normals, owners, none = unit(area_vectors(triangles)), pieces.labels[faces], np.zeros(len(faces))
-        return cls(places, normals, areas[faces], owners, spacing(places), none, links_of(places, normals, owners))
+        return cls(points, normals, areas[faces], owners, spacing(points), none, links_of(points, normals, owners))
 
     @cached_property
     def tree(self) -> BoxTree:
         """Tree over the positions."""
-        return BoxTree.of(self.places, self.places)
+        return BoxTree.of(self.points, self.points)
 
     @cached_property
     def balls(self) -> Floats:
         """(2 · leaves, 4) middle of each node's box, and the squared distance beyond which the node is one dipole."""
         low, high = self.tree.bounds[:, :3], self.tree.bounds[:, 3:]
-        with np.errstate(invalid="ignore"):  # nodes without places have infinite bounds
+        with np.errstate(invalid="ignore"):  # nodes without points have infinite bounds
             radii = 0.5 * np.linalg.norm(high - low, axis=1) + float(np.median(self.softening))
             balls = np.concatenate([0.5 * (low + high), (NODE_RADII * radii[:, None]) ** 2], axis=1)
         return np.where(np.isfinite(balls), balls, 0.0)
@@ -335,9 +335,9 @@ class Dipoles:
         """Restrict the system to some of the pieces, which are renumbered."""
         rows = kept[self.owners]
         owners = (np.cumsum(kept) - 1)[self.owners[rows]]
-        values = (self.places, self.normals, self.areas, self.softening, self.within)
-        places, normals, areas, softening, within = (array[rows] for array in values)
-        return Dipoles(places, normals, areas, owners, softening, within, self.links.chosen(rows))
+        values = (self.points, self.normals, self.areas, self.softening, self.within)
+        points, normals, areas, softening, within = (array[rows] for array in values)
+        return Dipoles(points, normals, areas, owners, softening, within, self.links.chosen(rows))
 
     def weights(self, fixed: Bools, start: Floats | None = None) -> Floats:
         """(k,) least-squares weights by conjugate gradients, from `start` or from zero.
@@ -350,6 +350,7 @@ class Dipoles:
         damping = WEIGHT_DAMPING * np.bincount(self.owners, shares)
 
         def system(values: Floats) -> Floats:
+            """Multiply the matrix of the least-squares problem by values of the unknowns."""
             weights = values[unknowns]
             gradient = self._adjoint(shares * self._numbers(weights)) + laplacian @ weights + damping * weights
             return sums_of(gradient, unknowns, n)
@@ -368,7 +369,7 @@ class Dipoles:
         """(n,) winding number at each dipole due to all others, for (k,) weights of the pieces."""
         vectors = self.normals * (self.areas * signs[self.owners])[:, None]
         nodes = self._sums(vectors)
-        return self._at_places(partial(_potentials, self._walk, vectors, nodes)) / (4.0 * np.pi)
+        return self._at_dipoles(partial(_potentials, self._walk, vectors, nodes)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
         """(n,) zeros, for levels at the dipoles due to their own group only, since loose triangles have none."""
@@ -376,10 +377,10 @@ class Dipoles:
 
     def _adjoint(self, charges: Floats) -> Floats:
         """Multiply (n,) charges at the dipoles by the transpose of W: (k,) fluxes of their field through the pieces."""
-        away = self.places - self.balls[1, :3]
+        away = self.points - self.balls[1, :3]
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
-        field = self._at_places(partial(_fields, self._walk, charges, nodes))
+        field = self._at_dipoles(partial(_fields, self._walk, charges, nodes))
         flux = self.areas * (field * self.normals).sum(axis=1) / (4.0 * np.pi)
         return np.bincount(self.owners, flux).astype(np.float64)
 
@@ -387,12 +388,12 @@ class Dipoles:
     def _walk(self) -> Walk:
         """The tree, and the nodes for each group; the same for all products with W."""
         order = self.tree.items[self.tree.items >= 0]
-        nodes = _nodes_for(self.places[order], self.balls, PLACES_TOGETHER)
-        return Walk(self.places, self.softening, self.tree.items, self.balls, order, *nodes, PLACES_TOGETHER)
+        nodes = _nodes_for(self.points[order], self.balls, POINTS_TOGETHER)
+        return Walk(self.points, self.softening, self.tree.items, self.balls, order, *nodes, POINTS_TOGETHER)
 
-    def _at_places(self, kernel: Callable[[Ints], Floats]) -> Floats:
+    def _at_dipoles(self, kernel: Callable[[Ints], Floats]) -> Floats:
         """(n, ...) values of a kernel at all dipoles; it is given ranges of indices into the order of the tree."""
-        (in_tree_order,) = in_chunks(lambda rows: (kernel(rows),), np.arange(len(self.places)))
+        (in_tree_order,) = in_chunks(lambda rows: (kernel(rows),), np.arange(len(self.points)))
         values = np.empty_like(in_tree_order)
         values[self._walk.order] = in_tree_order
         return values
@@ -410,14 +411,14 @@ class Dipoles:
         return sums
 
 
-def links_of(places: Floats, normals: Floats, owners: Ints) -> Links:
+def links_of(points: Floats, normals: Floats, owners: Ints) -> Links:
     """Link (n, 3) samples with neighbours on other pieces that lie roughly in one plane with them."""
-    n, k = len(places), min(PLANE_NEIGHBORS, len(places) - 1)
-    near = PointTree(places).query(places, k + 1)[1].reshape(n, -1)[:, 1:]
+    n, k = len(points), min(PLANE_NEIGHBORS, len(points) - 1)
+    near = PointTree(points).query(points, k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
     apart = owners[tails] != owners[heads]
     tails, heads = tails[apart], heads[apart]
-    ways = unit(places[heads] - places[tails])
+    ways = unit(points[heads] - points[tails])
     cosines = (normals[tails] * normals[heads]).sum(axis=1)
     rises = [np.abs((ways * normals[ends]).sum(axis=1)) for ends in (tails, heads)]
     return Links(tails, heads, np.maximum(0.0, 1.0 - 2.0 * np.maximum(*rises)) * cosines * np.abs(cosines))
@@ -431,7 +432,7 @@ def agreement(links: Links, shares: Floats, owners: Ints) -> sparse.csr_array:
     (tails, heads, strength), n = links, len(owners)
     total = np.bincount(tails, np.abs(strength), n) + np.bincount(heads, np.abs(strength), n)
     scale = np.sqrt(shares / np.maximum(total, 1e-12))
-    counts = np.bincount(owners)[owners]  # places of two large pieces may be farther apart than the pieces are
+    counts = np.bincount(owners)[owners]  # points of two large pieces may be farther apart than the pieces are
     weights = strength * PLANE_AGREEMENT * scale[tails] * scale[heads] / np.minimum(counts[tails], counts[heads])
     size = int(owners.max()) + 1
     sums = sparse.coo_array((weights, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
@@ -447,23 +448,23 @@ def spacing(points: Floats) -> Floats:
 
 
 @compiled
-def _nodes_for(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
-    """Return where the list of each group of `together` successive places begins, and the lists of tree nodes.
+def _nodes_for(points: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
+    """Return where the list of each group of `together` successive points begins, and the lists of tree nodes.
 
-    A node that all places of the group are far from is listed by its number, and acts as one dipole. A leaf near some
+    A node that all points of the group are far from is listed by its number, and acts as one dipole. A leaf near some
     of them is listed by minus its number, and its items count one by one.
     """
     leaves, stack, count = len(balls) // 2, np.empty(64, dtype=np.int64), 0
-    starts, nodes = np.zeros(-(-len(places) // together) + 1, dtype=np.int64), np.empty(leaves, dtype=np.int32)
+    starts, nodes = np.zeros(-(-len(points) // together) + 1, dtype=np.int64), np.empty(leaves, dtype=np.int32)
     x, y, z = np.empty(together), np.empty(together), np.empty(together)
-    for begin in range(0, len(places), together):
+    for begin in range(0, len(points), together):
         if count + leaves > len(nodes):
             more = np.empty(2 * len(nodes) + leaves, dtype=np.int32)
             more[:count] = nodes[:count]
             nodes = more
         for k in range(together):
-            p = min(begin + k, len(places) - 1)
-            x[k], y[k], z[k] = places[p, 0], places[p, 1], places[p, 2]
+            p = min(begin + k, len(points) - 1)
+            x[k], y[k], z[k] = points[p, 0], points[p, 1], points[p, 2]
         stack[0], depth = 1, 1
         while depth > 0:
             depth -= 1
@@ -484,18 +485,18 @@ def _nodes_for(places: Floats, balls: Floats, together: int) -> tuple[Ints, NDAr
 
 @compiled
 def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> Floats:
-    """(k,) sums of ``v · d / (|d|² + ε²)^(3/2)`` over all other dipoles v, where d points from the place to v.
+    """(k,) sums of ``v · d / (|d|² + ε²)^(3/2)`` over all other dipoles v, with d the vector from a point to v.
 
-    The places are those at `rows` of the walk's order, which begin at a multiple of `together`. `vectors` are (n, 3),
+    The points are those at `rows` of the walk's order, which begin at a multiple of `together`. `vectors` are (n, 3),
     `sums_below` their (2 · leaves, 3) sums below nodes.
     """
-    places, softening, items, balls, order, starts, nodes, together = walk
+    points, softening, items, balls, order, starts, nodes, together = walk
     leaves, result = len(balls) // 2, np.empty(len(rows))
     x, y, z, sums = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
     for begin in range(0, len(rows), together):
         for k in range(together):
             p = order[rows[min(begin + k, len(rows) - 1)]]
-            x[k], y[k], z[k], sums[k] = places[p, 0], places[p, 1], places[p, 2], 0.0
+            x[k], y[k], z[k], sums[k] = points[p, 0], points[p, 1], points[p, 2], 0.0
         group = rows[begin] // together
         for node in nodes[starts[group] : starts[group + 1]]:
             if node > 0:
@@ -510,9 +511,9 @@ def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> 
                     e = items[item]
                     if e < 0:
                         continue
-                    ax, ay, az, soft = places[e, 0], places[e, 1], places[e, 2], softening[e] ** 2
+                    ax, ay, az, soft = points[e, 0], points[e, 1], points[e, 2], softening[e] ** 2
                     vx, vy, vz = vectors[e, 0], vectors[e, 1], vectors[e, 2]
-                    for k in range(together):  # a dipole adds nothing at its own place, where d = 0
+                    for k in range(together):  # a dipole adds nothing at its own position, where d = 0
                         dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
                         square = dx * dx + dy * dy + dz * dz + soft
                         square = square if square > 0.0 else 1.0
@@ -524,19 +525,19 @@ def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> 
 
 @compiled
 def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floats:
-    """(k, 3) sums of ``c d / (|d|² + ε²)^(3/2)`` over all other charges c, where d points from c to the place.
+    """(k, 3) sums of ``c d / (|d|² + ε²)^(3/2)`` over all other charges c, with d the vector from c to a point.
 
-    The places are those at `rows` of the walk's order, which begin at a multiple of `together`; ε is the softening at
-    the place. `charges` are (n,), `sums_below` (2 · leaves, 4) charges and dipole moments of nodes.
+    The points are those at `rows` of the walk's order, which begin at a multiple of `together`; ε is the softening at
+    the point. `charges` are (n,), `sums_below` (2 · leaves, 4) charges and dipole moments of nodes.
     """
-    places, softening, items, balls, order, starts, nodes, together = walk
+    points, softening, items, balls, order, starts, nodes, together = walk
     leaves, result = len(balls) // 2, np.empty((len(rows), 3))
     x, y, z, soft = np.empty(together), np.empty(together), np.empty(together), np.empty(together)
     fx, fy, fz = np.empty(together), np.empty(together), np.empty(together)
     for begin in range(0, len(rows), together):
         for k in range(together):
             p = order[rows[min(begin + k, len(rows) - 1)]]
-            x[k], y[k], z[k], soft[k] = places[p, 0], places[p, 1], places[p, 2], softening[p] ** 2
+            x[k], y[k], z[k], soft[k] = points[p, 0], points[p, 1], points[p, 2], softening[p] ** 2
             fx[k], fy[k], fz[k] = 0.0, 0.0, 0.0
         group = rows[begin] // together
         for node in nodes[starts[group] : starts[group + 1]]:
@@ -557,7 +558,7 @@ def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floa
                     e = items[item]
                     if e < 0:
                         continue
-                    ax, ay, az, charge = places[e, 0], places[e, 1], places[e, 2], charges[e]
+                    ax, ay, az, charge = points[e, 0], points[e, 1], points[e, 2], charges[e]
                     for k in range(together):
                         dx, dy, dz = x[k] - ax, y[k] - ay, z[k] - az
                         square = dx * dx + dy * dy + dz * dz + soft[k]

@@ -54,6 +54,7 @@ def winding_numbers(samples: AreaSamples) -> Floats:
     core = DIPOLE_CORE * float(spacing.max())
 
     def far_field(wall: tuple[int, int, Floats]) -> tuple[Floats, Floats]:
+        """Winding numbers of the dipoles at the points of a wall, and their derivatives across it."""
         axis, _, lattice = wall
         return _far_field(lattice.reshape(-1, 3) * spacing, dipoles * spacing, strengths, axis, core)
 
@@ -127,23 +128,23 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 
 
 @compiled
-def _far_field(places: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
+def _far_field(points: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
     """(k,) winding number due to dipoles at (k, 3) places, and (k,) its derivative along an axis.
 
     Dipoles have (d, 3) positions and (d, 3) area vectors `strengths`; within `core` of one its field is bounded.
     """
-    value, slope = np.zeros(len(places)), np.zeros(len(places))
-    for i in range(len(places)):
+    value, slope = np.zeros(len(points)), np.zeros(len(points))
+    for i in range(len(points)):
         for j in range(len(dipoles)):
             square, product = 0.0, 0.0
             for d in range(3):
-                away = dipoles[j, d] - places[i, d]
+                away = dipoles[j, d] - points[i, d]
                 square += away * away
                 product += away * strengths[j, d]
             square = max(square, core * core)
             sphere = 4.0 * np.pi * square * np.sqrt(square)
             value[i] += product / sphere
-            away = dipoles[j, axis] - places[i, axis]
+            away = dipoles[j, axis] - points[i, axis]
             slope[i] += (3 * product * away / square - strengths[j, axis]) / sphere
     return value, slope
 

@@ -227,6 +227,7 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
     """Make the level set of a function; without a gradient, it is found by differences that suit its precision."""
 
     def values(points: Floats) -> Floats:
+        """(n,) values of the function above the level at (n, 3) points."""
         return _called(f, points, ())[..., 0] - level
 
     precision = np.asarray(f(box.mean(axis=0, keepdims=True))).dtype
@@ -234,6 +235,7 @@ def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats
     steps = float(rounding) ** 0.25 * grid.spacing
 
     def differences(points: Floats) -> Floats:
+        """(n, 3) central differences of the function at (n, 3) points, one-sided at the walls of the box."""
         steps_along_axes = steps * np.eye(3)
         around = np.stack([points[:, None] + steps_along_axes, points[:, None] - steps_along_axes])
         ahead, back = values(np.clip(around, *box).reshape(-1, 3)).reshape(2, len(points), 3)

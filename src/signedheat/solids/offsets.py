@@ -88,12 +88,12 @@ class Offset:
         return points - heights[:, None] * gradients, gradients
 
     def _mitred(
-        self, away: Floats, places: Floats, heights: Floats, gradients: Floats, reach: Floats
+        self, away: Floats, nearest_points: Floats, heights: Floats, gradients: Floats, reach: Floats
     ) -> tuple[Floats, Floats]:
-        """(n,) heights above planes of the faces at the nearest points `places`, up to the limit; (n, 3) gradients.
+        """(n,) heights above the planes of the faces at the nearest points, up to the limit; (n, 3) gradients.
 
-        `away` are (n, 3) vectors from the nearest points, `heights` and `gradients` those of distance to the solid, and
-        `reach` the (n,) distances of the surface.
+        `away` are (n, 3) vectors from the `nearest_points`, `heights` and `gradients` those of distance to the solid,
+        and `reach` the (n,) distances of the surface.
         """
         far = np.abs(heights)
         near = np.flatnonzero((heights * reach > 0) & (far >= np.abs(reach)) & (far < 2 * self.limit * np.abs(reach)))
@@ -104,10 +104,11 @@ class Offset:
         slack = MEETING_DISTANCE * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
         def part(rows: Floats) -> tuple[Floats, Ints]:
+            """Heights and triangles of `_steepest` for some (k, 6) rows of points and vectors."""
             starts, faces = tree.meeting(np.repeat(rows[:, None, :3], 3, axis=1), slack)
             return _steepest(features.rows, starts, faces, self._normals, rows, slack)
 
-        above, faces = in_chunks(part, np.concatenate([places[near], signs[:, None] * away[near]], axis=1))
+        above, faces = in_chunks(part, np.concatenate([nearest_points[near], signs[:, None] * away[near]], axis=1))
         beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # heights above the ball that cuts off corners
         planar = (faces >= 0) & (above > beyond)
         heights, gradients = heights.copy(), gradients.copy()
@@ -133,11 +134,12 @@ class Offset:
 def checked_reach(reach: Reach) -> Reach:
     """Wrap a function of (n, 3) points so that it raises unless it returns (n,) finite numbers."""
 
-    def called(places: Floats) -> Floats:
-        values = np.asarray(reach(places), dtype=np.float64)
-        if values.shape != (len(places),) or not np.isfinite(values).all():
+    def called(points: Floats) -> Floats:
+        """(n,) values at (n, 3) points, checked."""
+        values = np.asarray(reach(points), dtype=np.float64)
+        if values.shape != (len(points),) or not np.isfinite(values).all():
             raise SignedHeatError(
-                f"the distance has shape {values.shape} at {counted(len(places), 'place')}, or is not finite",
+                f"the distance has shape {values.shape} at {counted(len(points), 'place')}, or is not finite",
                 remedy="return a finite number for each of (n, 3) points",
                 element="distance",
             )
@@ -148,21 +150,21 @@ def checked_reach(reach: Reach) -> Reach:
 
 @compiled
 def _steepest(
-    rows: Floats, starts: Ints, faces: Ints, normals: Floats, places: Floats, slack: float
+    rows: Floats, starts: Ints, faces: Ints, normals: Floats, queries: Floats, slack: float
 ) -> tuple[Floats, Ints]:
     """(n,) heights of points above the plane, of the triangles that meet at a place, it is highest above; (n,) which.
 
-    A row of `places`, (n, 6), holds a place, and the vector from there to a point. Near place p are the triangles
+    A row of `queries`, (n, 6), holds a place, and the vector from there to a point. Near place p are the triangles
     ``faces[starts[p]:starts[p + 1]]``; those with normals 0 do not count. Without any, they are −∞ and −1.
     """
-    heights, steepest = np.full(len(places), -np.inf), np.full(len(places), -1, dtype=np.int64)
-    for p in range(len(places)):
+    heights, steepest = np.full(len(queries), -np.inf), np.full(len(queries), -1, dtype=np.int64)
+    for p in range(len(queries)):
         for k in range(starts[p], starts[p + 1]):
             f = faces[k]
             if normals[f, 0] == 0.0 and normals[f, 1] == 0.0 and normals[f, 2] == 0.0:
                 continue
-            if foot_on_triangle(rows, f, places[p, 0], places[p, 1], places[p, 2])[0] <= slack * slack:
-                height = normals[f, 0] * places[p, 3] + normals[f, 1] * places[p, 4] + normals[f, 2] * places[p, 5]
+            if foot_on_triangle(rows, f, queries[p, 0], queries[p, 1], queries[p, 2])[0] <= slack * slack:
+                height = normals[f, 0] * queries[p, 3] + normals[f, 1] * queries[p, 4] + normals[f, 2] * queries[p, 5]
                 if height > heights[p]:
                     heights[p], steepest[p] = height, f
     return heights, steepest
@@ -232,9 +234,9 @@ class SheetWall:
             depths = np.maximum(heights - self.above, -self.below - heights)
         return depths if self.rim is None else np.maximum(depths, self._beyond(points, nearest))
 
-    def _beyond(self, points: Floats, nearest_places: NearestFaces) -> Floats:
+    def _beyond(self, points: Floats, nearest_points: NearestFaces) -> Floats:
         """(n,) distances of (n, 3) points beyond the rim, negative over the surface, given their nearest points."""
-        faces, features = nearest_places.faces, nearest_places.features
+        faces, features = nearest_points.faces, nearest_points.features
         rim_sides = np.full((len(points), 2), -1)
         edges, vertices = (features > 0) & (features < 4), features > 3
         rim_sides[edges] = self.sides[faces[edges], features[edges] - 1][:, None]
@@ -243,14 +245,14 @@ class SheetWall:
         shares = np.broadcast_to([1.0, 0.0], rim_sides.shape).copy()
         sides = rim_sides[edges, 0]
         begin, end = self.corners[sides].swapaxes(0, 1)
-        along = np.linalg.norm(nearest_places.places[edges] - begin, axis=1) / np.linalg.norm(end - begin, axis=1)
+        along = np.linalg.norm(nearest_points.places[edges] - begin, axis=1) / np.linalg.norm(end - begin, axis=1)
         shares[edges] = along[:, None]
         outward = self.outward[rim_sides]
         outward = outward[:, :, 0] + shares[..., None] * (outward[:, :, 1] - outward[:, :, 0])
-        beyond = np.einsum("nki,ni->nk", outward, points - nearest_places.places).max(axis=1)
+        beyond = np.einsum("nki,ni->nk", outward, points - nearest_points.places).max(axis=1)
         over = np.flatnonzero((rim_sides < 0).all(axis=1))
-        nearest, weights = cast("TriangleTree", self.rim).nearest(nearest_places.places[over])
+        nearest, weights = cast("TriangleTree", self.rim).nearest(nearest_points.places[over])
         ends = self.corners[nearest]
         on_rim = ends[:, 0] + (1 - weights[:, :1]) * (ends[:, 1] - ends[:, 0])
-        beyond[over] = -np.linalg.norm(nearest_places.places[over] - on_rim, axis=1)
+        beyond[over] = -np.linalg.norm(nearest_points.places[over] - on_rim, axis=1)
         return beyond

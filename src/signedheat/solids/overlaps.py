@@ -154,29 +154,29 @@ def bodies_around(
     """
     triangles = directed(pieces.triangles, signs[pieces.labels])
     bodies = Bodies.of(pieces, triangles, groups, alone, signs * given)
-    count, n = len(bodies.levels), len(system.places)
+    count, n = len(bodies.levels), len(system.points)
     if count < 2 and not (count and len(closed)):
         return np.zeros(n)
     numbers = bodies.numbers[pieces.labels]
     triangles = directed(triangles, np.sign(bodies.levels)[numbers])
-    places = np.concatenate([system.places, rims.middles])
+    points = np.concatenate([system.points, rims.middles])
     homes = bodies.numbers[np.concatenate([system.owners, rims.owners])]
     own = homes >= 0
     away = np.flatnonzero(~own)
     if len(away):
-        homes[away] = homes[own][PointTree(places[own]).query(places[away])[1]]
+        homes[away] = homes[own][PointTree(points[own]).query(points[away])[1]]
     normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
     sizes = np.concatenate([system.areas, rims.lengths])
     order = np.argsort(numbers, kind="stable")
     parts = np.split(triangles[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
     parts += [closed] * (len(closed) > 0)  # closed surfaces count as one more body
-    rows, others, numbers_there = _windings(places, normals, sizes, parts)
+    rows, others, numbers_there = _windings(points, normals, sizes, parts)
     homes_there = homes[rows]
     weights = np.where(own, sizes, 0.0)
-    on_rim = np.arange(len(places)) >= n
+    on_rim = np.arange(len(points)) >= n
 
     def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
-        """Average values over chosen places of body `one`, counting 0 outside the box of `other`, for pairs of both."""
+        """Average values over chosen points of body `one`, counting 0 outside the box of `other`, for pairs of both."""
         entries, shape = weights[rows] * chosen[rows] * values, (count + 1, count + 1)
         sums = sparse.coo_array((entries, (homes_there, others)), shape=shape).tocsr()
         total = np.bincount(homes, weights * chosen, count + 1)
@@ -193,25 +193,25 @@ def bodies_around(
     ignored = (homes_there != others) & ((united & not_nested) | (enclosed & stays))
     subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
     everything = WindingTree.of(np.concatenate(parts[:count]))
-    around = everything.levels(system.places, system.normals, system.areas)
+    around = everything.levels(system.points, system.normals, system.areas)
     return around - np.bincount(rows[subtracted], numbers_there[subtracted], n)
 
 
-def _windings(places: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
-    """Pair (n, 3) places with the bodies in whose boxes they lie: (k,) places, (k,) bodies, (k,) winding numbers.
+def _windings(points: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
+    """Pair (n, 3) points with the bodies in whose boxes they lie: (k,) points, (k,) bodies, (k,) winding numbers.
 
     A body is (m, 3, 3) triangles of `parts`. On its surface, its winding number is the mean of both sides.
     """
     boxes = np.array([(corners.min(axis=(0, 1)), corners.max(axis=(0, 1))) for corners in parts])
     # a point is a triangle whose corners are equal
-    starts, bodies = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(places[:, None], 3, axis=1))
-    rows = np.repeat(np.arange(len(places)), np.diff(starts))
-    inside_box = (places[rows] >= boxes[bodies, 0]) & (places[rows] <= boxes[bodies, 1])
+    starts, bodies = BoxTree.of(boxes[:, 0], boxes[:, 1]).meeting(np.repeat(points[:, None], 3, axis=1))
+    rows = np.repeat(np.arange(len(points)), np.diff(starts))
+    inside_box = (points[rows] >= boxes[bodies, 0]) & (points[rows] <= boxes[bodies, 1])
     kept = np.flatnonzero(inside_box.all(axis=1))
     kept = kept[np.argsort(bodies[kept], kind="stable")]
     rows, bodies, windings = rows[kept], bodies[kept], np.zeros(len(kept))
     for body, (begin, end) in enumerate(pairwise(np.searchsorted(bodies, np.arange(len(parts) + 1)))):
         if end > begin:
             batch = rows[begin:end]
-            windings[begin:end] = WindingTree.of(parts[body]).levels(places[batch], normals[batch], sizes[batch])
+            windings[begin:end] = WindingTree.of(parts[body]).levels(points[batch], normals[batch], sizes[batch])
     return rows, bodies, windings

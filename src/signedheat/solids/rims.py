@@ -18,7 +18,7 @@ from ..mesh.welding import same_positions, tolerances
 from ..parallel import PointTree
 from ..surfaces.triangle_mesh import TriangleMesh
 
-EDGE_PLACES = 8
+EDGE_POINTS = 8
 """Number of sample points on an edge from which other edges along it are searched for. They are closer together than
 `ALONG_EDGE`."""
 ALONG_EDGE = 0.1
@@ -27,7 +27,7 @@ ALONG_EDGE = 0.1
 MOST_ASKED = 1024
 """Edges are searched from in about this many groups. If the first edge of a group finds no edge opposite to it, nor do
 the others search."""
-SHARED_PLACES = 3
+SHARED_POINTS = 3
 """Two edges run along each other if at least this many sample points of one lie along the other. Edges that only meet
 at a corner have fewer."""
 STRAIGHT_RIM = 1e-5
@@ -160,7 +160,7 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     # each place with the edges that it lies along, whichever of the two is the longer
     beside = np.unique(np.concatenate([first, second]) * len(ends) + owners[np.concatenate([second, first])])
     pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
-    pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED_PLACES]
+    pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED_POINTS]
     first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
     cosines = (ways[first] * ways[second]).sum(axis=1)
     alike = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
@@ -175,7 +175,7 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     partner, which is nearest in position and direction. The time is O(n log n).
     """
     ways, (places, owners) = unit(ends[:, 1] - ends[:, 0]), _points_on(ends)
-    partners = np.full((len(ends), EDGE_PLACES), -1)
+    partners = np.full((len(ends), EDGE_POINTS), -1)
     sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))
     groups = np.arange(len(ends)) // (1 + len(ends) // MOST_ASKED)
     firsts = np.append(True, groups[1:] != groups[:-1])[: len(ends)]
@@ -186,10 +186,10 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
         for asking in (firsts, ~firsts):
             met = (partners >= 0).any(axis=1)
             edges = np.flatnonzero((sizes == size) & asking & (firsts | np.isin(groups, groups[met])))
-            rows = (EDGE_PLACES * edges[:, None] + np.arange(EDGE_PLACES)).ravel()
+            rows = (EDGE_POINTS * edges[:, None] + np.arange(EDGE_POINTS)).ravel()
             back = np.concatenate([places[rows] / size, -2.0 * ways[owners[rows]]], axis=1)
             near = tree.query(back, distance_upper_bound=2.0)[1]
-            partners[edges] = np.where(near < len(places), near, -1).reshape(-1, EDGE_PLACES)
+            partners[edges] = np.where(near < len(places), near, -1).reshape(-1, EDGE_POINTS)
     found = partners.ravel()
     first = np.flatnonzero(found >= 0)
     edge, other = owners[first], owners[found[first]]
@@ -200,17 +200,17 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     kept = (gaps <= np.minimum(reaches[edge], reaches[other])) & ((ways[edge] * ways[other]).sum(axis=1) < -SAME_WAY)
     kept &= (ends[edge] != ends[other, ::-1]).any(axis=(1, 2))
     pairs, shared = np.unique(edge[kept] * len(ends) + other[kept], return_counts=True)
-    pairs = pairs[shared >= SHARED_PLACES]
+    pairs = pairs[shared >= SHARED_POINTS]
     pairs = np.stack([pairs // max(len(ends), 1), pairs % max(len(ends), 1)], axis=1)
     one, another = np.unique(np.sort(pairs, axis=1), axis=0).T
     return one, another
 
 
 def _points_on(ends: Floats) -> tuple[Floats, Ints]:
-    """Return `EDGE_PLACES` points on each edge, with (n, 2, 3) ends: (k, 3) positions, and (k,) their edges."""
-    shares = (np.arange(EDGE_PLACES) + 0.5) / EDGE_PLACES
+    """Return `EDGE_POINTS` points on each edge, with (n, 2, 3) ends: (k, 3) positions, and (k,) their edges."""
+    shares = (np.arange(EDGE_POINTS) + 0.5) / EDGE_POINTS
     places = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
-    return places.reshape(-1, 3), np.repeat(np.arange(len(ends)), EDGE_PLACES)
+    return places.reshape(-1, 3), np.repeat(np.arange(len(ends)), EDGE_POINTS)
 
 
 def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:

@@ -158,6 +158,7 @@ class Crossed(NamedTuple):
         planes = order[first[met] + number]
 
         def above(corners: Ints) -> Floats:
+            """Heights of corners, with one row for each pair of a face and a plane, above the plane of the pair."""
             away = heights[corners] - levels[planes].reshape(-1, *[1] * (corners.ndim - 1))
             return np.where(np.abs(away) <= slack, 0.0, away)
 

@@ -228,6 +228,7 @@ class Solid(Displayed, Represented, Frozen):
         tree = self.tree if is_signed else self._given_tree
 
         def measured(chunk: Floats) -> tuple[Floats]:
+            """(k,) distances of (k, 3) points."""
             nearest = tree.search(chunk)
             inside = is_signed and self.windings.inside_near(chunk, nearest)
             return (np.where(inside, -nearest.distances, nearest.distances),)

@@ -302,10 +302,10 @@ def widths(shape: Mesh) -> Widths:
     )
 
 
-def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) -> tuple[Floats, Ints]:
-    """(n,) diameter of the largest ball behind each of (n, 3) places, or NaN, and (n,) the face that it touches.
+def _diameters(tree: FaceTree, facing: Floats, points: Floats, normals: Floats) -> tuple[Floats, Ints]:
+    """(n,) diameter of the largest ball behind each of (n, 3) points, or NaN, and (n,) the face that it touches.
 
-    `normals` are (n, 3) unit normals at the places, and `facing` (m, 3) those of the faces of the tree, or 0 for faces
+    `normals` are (n, 3) unit normals at the points, and `facing` (m, 3) those of the faces of the tree, or 0 for faces
     that are no walls.
     """
     lower, upper = tree.tree.bounds[1, :3], tree.tree.bounds[1, 3:]
@@ -316,18 +316,18 @@ def _diameters(tree: FaceTree, facing: Floats, places: Floats, normals: Floats) 
     ways = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
 
     def measured(rays: Floats) -> tuple[Floats, Ints]:
-        """Measure the same for (k, 6) places and their normals."""
+        """Measure the same for (k, 6) points and their normals."""
         diameters, touched = np.full(len(rays), extent), np.zeros(len(rays), dtype=np.int64)
         rows, boxes = tree.features.rows, tree.tree
         _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, diameters, touched)
         return diameters, touched
 
-    diameters, touched = in_chunks(measured, np.column_stack([places, normals]))
+    diameters, touched = in_chunks(measured, np.column_stack([points, normals]))
     return np.where(diameters < extent, diameters, np.nan), touched
 
 
-def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
-    """(n, 3) unit normals at (n, 3) places on (n,) faces of triangles, interpolated from mean normals at corners.
+def _normals_at(triangles: Floats, faces: Ints, points: Floats) -> Floats:
+    """(n, 3) unit normals at (n, 3) points on (n,) faces of triangles, interpolated from mean normals at corners.
 
     Unlike them, face normals would tilt balls and make them too small.
     """
@@ -338,7 +338,7 @@ def _normals_at(triangles: Floats, faces: Ints, places: Floats) -> Floats:
     first, second = pairs.T
     fans = connected_components(ids.size, np.append(first, following[first]), np.append(following[second], second))
     corners = unit(sums_of(corner_normals(triangles), fans, ids.size))[fans].reshape(-1, 3, 3)
-    return unit(np.einsum("nk,nki->ni", weights_in(triangles[faces], places), corners[faces]))
+    return unit(np.einsum("nk,nki->ni", weights_in(triangles[faces], points), corners[faces]))
 
 
 def _quantile(widths: Floats, share: float) -> float | None:
@@ -355,24 +355,24 @@ def _descend(
     discs: Floats,
     ways: Floats,
     items: Ints,
-    places: Floats,
+    points: Floats,
     least: float,
     out: Floats,
     touched: Ints,
 ) -> None:
-    """Shrink the diameters in `out` at (n, 6) places and their normals until no wall reaches into a ball.
+    """Shrink the diameters in `out` at (n, 6) points and their normals until no wall reaches into a ball.
 
     `touched` becomes the face that each ball touches. `rows` are those of `FaceFeatures`, `facing` the (m, 3) normals
-    of walls, and `bounds`, `discs`, `ways` (bounds of normals) and `items` those of a search tree. Places nearer than
+    of walls, and `bounds`, `discs`, `ways` (bounds of normals) and `items` those of a search tree. Points nearer than
     `least` to a face coincide with it.
 
     In the first round walls may reach in by `ROUND_WALL`, since a ball that fits a round wall touches all of it. In
     each further round, near the point that the ball touches, they may do so by `FINER` times as much.
     """
     leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
-    for p in range(len(places)):
-        x, y, z = places[p, 0], places[p, 1], places[p, 2]
-        nx, ny, nz = places[p, 3], places[p, 4], places[p, 5]
+    for p in range(len(points)):
+        x, y, z = points[p, 0], points[p, 1], points[p, 2]
+        nx, ny, nz = points[p, 3], points[p, 4], points[p, 5]
         diameter, tx, ty, tz, reach, slack = out[p], x, y, z, np.inf, ROUND_WALL
         while slack > SETTLED:
             stack[0], depth = 1, 1
@@ -397,7 +397,7 @@ def _descend(
                     outside = max(across - discs[node, 6], 0.0)
                     if not height * height + outside * outside < limit:
                         continue
-                if node < leaves:  # visit the child nearer to the place first
+                if node < leaves:  # visit the child nearer to the point first
                     first = _square(bounds, 2 * node, x, y, z) <= _square(bounds, 2 * node + 1, x, y, z)
                     stack[depth] = 2 * node + 1 if first else 2 * node
                     stack[depth + 1] = stack[depth] ^ 1

@@ -89,10 +89,11 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Fiel
     tree, windings = prepared(solid)
 
     def tile(first: Ints) -> tuple[Floats, NDArray[np.float32]]:
+        """Distances and confidence at the nodes of the tile of blocks that begins at block `first`."""
         stop = np.minimum(first + TILE, n_blocks)
         axes = (np.arange(*ends) for ends in zip(first, stop, strict=True))
-        places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-        return distances_in(tree, windings, grid, BLOCK * first, places)
+        indices = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return distances_in(tree, windings, grid, BLOCK * first, indices)
 
     for done, (first, (distances, trusted)) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
         window = tuple(slice(f, f + n) for f, n in zip(BLOCK * first, distances.shape, strict=True))
@@ -120,7 +121,7 @@ def band_field(
     coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE_NODES)))), None)
     reach = width + float(np.linalg.norm(grid.spacing))  # complete the cells at the ends of the band
     limit = blocks_that_fit(store)
-    places, factor = blocks_near(tree, grid, reach, limit)
+    indices, factor = blocks_near(tree, grid, reach, limit)
     if factor > 1:
         raise MemoryLimitError(
             f"the band has more than {limit:,} blocks of {BLOCK_NODES} nodes, "
@@ -128,7 +129,7 @@ def band_field(
             remedy=f"use a spacing of {factor * float(grid.spacing.min()):.3g} or more, or a narrower band"
             + ("" if store is not None else ", or keep it on disk (store)"),
         )
-    blocks = Blocks.of(places, grid.shape)
+    blocks = Blocks.of(indices, grid.shape)
     if not len(blocks):
         raise OutsideError("no node of the grid lies within the band", element="grid")
     tiles, diagnostics = tiles_of(blocks), solid.diagnostics
@@ -137,6 +138,7 @@ def band_field(
         confidence: NDArray[Any] = np.empty(values.shape, dtype=np.float16)
 
         def solve(rows: Ints) -> Ints:
+            """Write the values at the nodes of the blocks with these row numbers; return them."""
             values[rows], confidence[rows] = solved(tree, windings, grid, blocks.places[rows].astype(np.int64))
             return rows
 
@@ -151,31 +153,31 @@ def band_field(
 
 
 def distances_in(
-    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, places: Ints
+    tree: FaceTree, windings: Windings, grid: Grid, first: Ints, indices: Ints
 ) -> tuple[Floats, NDArray[np.float32]]:
     """Compute signed distances at nodes of the blocks at (n, 3) places: (a, b, c) from node `first` on, else NaN.
 
     Also return the (a, b, c) confidence in the nearest faces.
     """
     lattice = Lattice(np.array(grid.origin), np.array(grid.spacing), np.array(grid.shape))
-    squares, faces = nearest_at_nodes(tree, lattice, first, places)
+    squares, faces = nearest_at_nodes(tree, lattice, first, indices)
     values = np.sqrt(squares, out=squares)
     inside = _inside(tree, windings, grid, first, values, faces)
     return np.negative(values, out=values, where=inside), tree.features.trusted[faces]
 
 
 def solved(
-    tree: FaceTree, windings: Windings, grid: Grid, places: Ints
+    tree: FaceTree, windings: Windings, grid: Grid, indices: Ints
 ) -> tuple[NDArray[np.float32], NDArray[np.float16]]:
     """(n, 8, 8, 8) signed distances at the nodes of blocks at (n, 3) places, NaN beyond the grid; and confidence.
 
     The places should be near each other, since memory grows with the box around them.
     """
-    first = places.min(axis=0)
-    distances, trusted = distances_in(tree, windings, grid, BLOCK * first, places)
-    values = np.full((len(places), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
+    first = indices.min(axis=0)
+    distances, trusted = distances_in(tree, windings, grid, BLOCK * first, indices)
+    values = np.full((len(indices), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
     confidence = np.ones(values.shape, dtype=np.float16)
-    for row, place in enumerate(BLOCK * (places - first)):
+    for row, place in enumerate(BLOCK * (indices - first)):
         a, b, c = (slice(p, p + BLOCK) for p in place)
         i, j, k = distances[a, b, c].shape
         values[row, :i, :j, :k], confidence[row, :i, :j, :k] = distances[a, b, c], trusted[a, b, c]
@@ -236,10 +238,10 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
         numbers = {side: number for side, _, number in _cubes(grid, near, FOLLOWED_CUBES)}
         if max(numbers.values()) > COUNT_FACTOR * limit:
             return np.zeros((0, 3), dtype=np.int64), 2 * max(s for s in numbers if numbers[s] * COUNT_FACTOR > limit)
-    for side, places, number in _cubes(grid, near, None):
+    for side, indices, number in _cubes(grid, near, None):
         if number > limit:
-            return places[:0], 2 * side
-    return places, 1
+            return indices[:0], 2 * side
+    return indices, 1
 
 
 def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
@@ -249,16 +251,16 @@ def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) 
     """
     n_blocks = -(-np.array(grid.shape) // BLOCK)
     side, weight, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)
-    places, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
-    while side and len(places):
+    indices, halves = np.zeros((1, 3), dtype=np.int64), np.array(list(np.ndindex(2, 2, 2)))
+    while side and len(indices):
         half = 0.5 * (side * BLOCK - 1)
-        places = places[near(grid.origin + (places * side * BLOCK + half) * grid.spacing, half)]
-        yield side, places, weight * len(places)
-        if few is not None and len(places) > few:
-            places, weight = random.choice(places, few, replace=False), weight * len(places) / few
+        indices = indices[near(grid.origin + (indices * side * BLOCK + half) * grid.spacing, half)]
+        yield side, indices, weight * len(indices)
+        if few is not None and len(indices) > few:
+            indices, weight = random.choice(indices, few, replace=False), weight * len(indices) / few
         side //= 2
-        places = (2 * places[:, None] + halves).reshape(-1, 3)
-        places = places[(places * side < n_blocks).all(axis=1)]
+        indices = (2 * indices[:, None] + halves).reshape(-1, 3)
+        indices = indices[(indices * side < n_blocks).all(axis=1)]
 
 
 def blocks_that_fit(store: str | PathLike[str] | None) -> int:

@@ -171,9 +171,11 @@ class DigitalSurface(Displayed, Surface):
         return self.squares.on_triangulation(values)
 
     def _plain(self, values: Floats) -> tuple[TriangleMesh, Floats]:
+        """Return the triangles of the voxels' faces, and (m,) values at their vertices: see `FieldDomain`."""
         return self.triangulation, self.on_triangulation(values)
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
+        """Convert a mask of the faces to one of the four triangles of each."""
         return self.squares._triangle_mask(face_mask)
 
     def to_pyvista(self) -> pyvista.PolyData:

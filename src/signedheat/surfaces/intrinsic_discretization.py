@@ -64,6 +64,7 @@ class RetriangulatedForZeroSet(Retriangulated):
     coarsest: ClassVar[float] = np.inf
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
+        """Refine the mesh as `Retriangulated` does, with a smaller h for short curves with gaps."""
         surface, groups = super().adapt(sources)
         scales = CurveGroups.of(self.mesh, sources).scales
         parts = [part for group in groups for part in group if len(part.ends)]

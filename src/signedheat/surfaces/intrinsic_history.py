@@ -107,6 +107,7 @@ class History(Frozen):
 
     @property
     def _most_faces(self) -> int:
+        """Upper bound of the ids of faces in both triangulations."""
         return max(self.before.n_faces, self.after.n_faces)
 
     @cached_property
@@ -241,9 +242,9 @@ def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32
             while around[side] != faces[p]:
                 side += 1
             old, new = (BEFORE_STEP[kind], AFTER_STEP[kind]) if links.forward else (AFTER_STEP[kind], BEFORE_STEP[kind])
-            place = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, rows[p])
-            faces[p] = around[place]
-            n = np.int64(links.next_of_face[n, place])
+            new_face = exchange(kind, weights[n], links.forward, old[side], start[side], new, start, rows[p])
+            faces[p] = around[new_face]
+            n = np.int64(links.next_of_face[n, new_face])
 
 
 @compiled
@@ -257,7 +258,7 @@ def exchange(
     """
     lead = 3 if kind == SPLIT_FACE else 2  # points with a smaller index are on one side of the dependency
     x = np.zeros(4)
-    gone, place = -1, 0
+    gone, new_face = -1, 0
     for r in range(len(rows)):
         x[:] = 0.0
         for k in range(3):
@@ -267,16 +268,16 @@ def exchange(
             for l in range(4):
                 if (l < lead) == forward and c[l] > 0.0 and x[l] / c[l] < least:
                     gone, least = l, x[l] / c[l]
-            while gone >= 0 and (new_corners[place] == gone).any():
-                place += 1
+            while gone >= 0 and (new_corners[new_face] == gone).any():
+                new_face += 1
         if gone >= 0:  # no point is left out where a face is only turned over
             amount = x[gone] / c[gone] if forward else -x[gone] / c[gone]
             for l in range(4):
                 x[l] += -amount * c[l] if l < lead else amount * c[l]
             x[gone] = 0.0
         for k in range(3):
-            rows[r, (new_start[place] + k) % 3] = x[new_corners[place, k]]
-    return place
+            rows[r, (new_start[new_face] + k) % 3] = x[new_corners[new_face, k]]
+    return new_face
 
 
 @compiled

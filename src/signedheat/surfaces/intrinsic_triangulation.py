@@ -393,12 +393,15 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         return transfer_segments(seen, self.refinement, self.history, self.base)
 
     def _interpolant(self, values: Floats, beyond: Exact | None) -> IntrinsicInterpolant:
+        """Return the function that interpolates (n,) values linearly in the intrinsic triangles."""
         return IntrinsicInterpolant(self, values)
 
     def _restricted(self) -> TriangleMesh:
+        """Return the mesh, whose vertices come first."""
         return self.mesh
 
     def _plain(self, values: Floats) -> tuple[TriangleMesh, Floats]:
+        """Return the mesh, and the values at its vertices."""
         return self.mesh, values[: self.mesh.n_vertices]
 
     def to_pyvista(self) -> pyvista.PolyData:

@@ -134,6 +134,7 @@ class TangentPlanes:
         tree = PointTree(points)
 
         def fitted(ids: Ints) -> tuple[NDArray[Any], ...]:
+            """Principal axes, directions away from neighbours, neighbours, reach and `flat` for (k,) ids of points."""
             centers, own = points[ids], normals[ids]
             distances, near = tree.query(centers, k=many + 1)
             spacing = point_spacing(distances[:, nearest], nearest)

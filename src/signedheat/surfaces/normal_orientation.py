@@ -115,12 +115,12 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
     """Find signs that orient (n, 3) axes outwards; if they were `given`, most of them may be right, and are kept."""
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
-    chosen = spread_out(fits.places, KEPT_SPACING * fits.reaches) if fits.noisy else np.arange(n)
-    chosen = chosen[~_lone(fits.places[chosen], fits.reaches[chosen])]
+    chosen = spread_out(fits.points, KEPT_SPACING * fits.reaches) if fits.noisy else np.arange(n)
+    chosen = chosen[~_lone(fits.points[chosen], fits.reaches[chosen])]
     if len(chosen) > MOST_TET_POINTS:
         chosen = np.sort(np.random.default_rng(0).choice(chosen, MOST_TET_POINTS, replace=False))
-    places = fits.places[chosen]
-    links, sided = sign_links(places, axes[chosen], fits.reaches[chosen], fits.noisy)
+    kept_points = fits.points[chosen]
+    links, sided = sign_links(kept_points, axes[chosen], fits.reaches[chosen], fits.noisy)
     m = len(chosen)
     if given or not sided:
         typical = 0.5 * float(np.median(links.strength(m + 1)[:m]))
@@ -132,49 +132,49 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
     signs[chosen] = decision[:m] * decision[m if sided else m + 1]
     rest = np.flatnonzero(signs == 0)
     if len(rest):
-        signs[rest] = _followed(places, axes[chosen] * signs[chosen, None], fits.places[rest], axes[rest])
+        signs[rest] = _followed(kept_points, axes[chosen] * signs[chosen, None], fits.points[rest], axes[rest])
     coherence = links.coherence(decision)
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
     return OutwardSigns(signs, sided, coherence)
 
 
-def _lone(places: Floats, reaches: Floats) -> Bools:
+def _lone(points: Floats, reaches: Floats) -> Bools:
     """(n,) whether each point is an outlier, much farther from its neighbours than these are from theirs.
 
     `reaches` are the (n,) distances of points to their neighbours.
     """
-    near = PointTree(places).query(places, k=min(POINT_NEIGHBORS + 1, len(places)))[1]
-    return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(places), -1)[:, 1:]], axis=1)
+    near = PointTree(points).query(points, k=min(POINT_NEIGHBORS + 1, len(points)))[1]
+    return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(points), -1)[:, 1:]], axis=1)
 
 
-def _followed(places: Floats, normals: Floats, others: Floats, axes: Floats) -> Floats:
-    """(k,) signs that make the (k, 3) axes at `others`, (k, 3), agree with the (n, 3) normals at the nearest places."""
-    distances, near = PointTree(places).query(others, k=min(6, len(places)))
-    distances, near = distances.reshape(len(others), -1), near.reshape(len(others), -1)
+def _followed(points: Floats, normals: Floats, queries: Floats, axes: Floats) -> Floats:
+    """(k,) signs that make the (k, 3) axes at `queries`, (k, 3), agree with the (n, 3) normals at nearest points."""
+    distances, near = PointTree(points).query(queries, k=min(6, len(points)))
+    distances, near = distances.reshape(len(queries), -1), near.reshape(len(queries), -1)
     weights = 1.0 / (distances + 1e-9 * max(float(distances.max()), np.finfo(float).tiny))
     cosines = np.einsum("nj,nkj->nk", axes, normals[near])
     return np.where((weights * cosines * np.abs(cosines)).sum(axis=1) >= 0, 1.0, -1.0)
 
 
-def sign_links(places: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
+def sign_links(points: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
     """Link the signs of (n, 3) axes by neighbours, by balls, and by the hull to the outside, which is node n.
 
     Also return whether there are balls; without them, as for points in a plane, neighbours alone are linked.
     """
-    near = _neighbor_links(places, axes, 1.0 if noisy else WEAK_WEIGHT)
-    moves = np.random.default_rng(0).uniform(-1, 1, places.shape) * (JOGGLE * reaches[:, None])
+    near = _neighbor_links(points, axes, 1.0 if noisy else WEAK_WEIGHT)
+    moves = np.random.default_rng(0).uniform(-1, 1, points.shape) * (JOGGLE * reaches[:, None])
     try:
-        tets = interruptible(scipy.spatial.Delaunay, places + moves)
+        tets = interruptible(scipy.spatial.Delaunay, points + moves)
     except (scipy.spatial.QhullError, ValueError):
         return near, False
-    if tets.simplices.max() >= len(places):  # Qhull gave up on precision, and its point at infinity is a corner
+    if tets.simplices.max() >= len(points):  # Qhull gave up on precision, and its point at infinity is a corner
         return near, False
-    flat = np.ptp(places @ np.linalg.eigh(np.cov(places.T))[1][:, 0]) <= 10 * JOGGLE * float(reaches.max())
+    flat = np.ptp(points @ np.linalg.eigh(np.cov(points.T))[1][:, 0]) <= 10 * JOGGLE * float(reaches.max())
     if flat:
         return near, False
-    balls = _ball_links(places, axes, tets.simplices.astype(np.int64))
-    return Links.joined(near, balls, _hull_links(places, axes, tets)), True
+    balls = _ball_links(points, axes, tets.simplices.astype(np.int64))
+    return Links.joined(near, balls, _hull_links(points, axes, tets)), True
 
 
 def _confidence(cosines: Floats) -> Floats:
@@ -182,9 +182,9 @@ def _confidence(cosines: Floats) -> Floats:
     return np.where(np.abs(cosines) > BALL_COSINE, np.sign(cosines) * cosines**4, 0.0)
 
 
-def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
+def _ball_links(points: Floats, axes: Floats, tets: Ints) -> Links:
     """Link the signs at every two corners of a tet along whose axes its circumscribed ball lies; tets are (t, 4)."""
-    corners = places[tets]
+    corners = points[tets]
     u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
     vw = np.cross(v, w)
@@ -203,18 +203,18 @@ def _ball_links(places: Floats, axes: Floats, tets: Ints) -> Links:
     return Links(tails, heads, weights[linked])
 
 
-def _hull_links(places: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
+def _hull_links(points: Floats, axes: Floats, tets: scipy.spatial.Delaunay) -> Links:
     """Link the corners of the convex hull with the outside, node n, which is away from the mean of the points.
 
     The tets behind faces of the hull cannot tell the side, since they may be flat.
     """
     tet, opposite = np.nonzero(tets.neighbors < 0)
     faces = tets.simplices[tet[:, None], (opposite[:, None] + [1, 2, 3]) % 4].astype(np.int64)
-    a, b, c = places[faces].transpose(1, 0, 2)
+    a, b, c = points[faces].transpose(1, 0, 2)
     outward = unit(np.cross(b - a, c - a))
-    outward *= np.sign((outward * (a - places.mean(axis=0))).sum(axis=1))[:, None]
+    outward *= np.sign((outward * (a - points.mean(axis=0))).sum(axis=1))[:, None]
     weights = _confidence(np.einsum("fj,fkj->fk", outward, axes[faces]))
-    return Links(faces.ravel(), np.full(faces.size, len(places)), weights.ravel())
+    return Links(faces.ravel(), np.full(faces.size, len(points)), weights.ravel())
 
 
 def neighbors_agree(points: Floats, normals: Floats) -> bool:
@@ -229,12 +229,12 @@ def neighbors_agree(points: Floats, normals: Floats) -> bool:
     return bool(((first * second).sum(axis=1) > SAME_WAY).all())
 
 
-def _neighbor_links(places: Floats, axes: Floats, weight: float) -> Links:
+def _neighbor_links(points: Floats, axes: Floats, weight: float) -> Links:
     """Link neighbours as if on a circle: reflection in the plane midway between them maps one axis to the other."""
-    n, k = len(places), min(POINT_NEIGHBORS, len(places) - 1)
-    neighbors = PointTree(places).query(places, k=k + 1)[1].reshape(n, -1)[:, 1:]
+    n, k = len(points), min(POINT_NEIGHBORS, len(points) - 1)
+    neighbors = PointTree(points).query(points, k=k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), neighbors.ravel()
-    step = unit(places[heads] - places[tails])
+    step = unit(points[heads] - points[tails])
     first, second = axes[tails], axes[heads]
     cosines = (first * second).sum(axis=1) - 2 * (first * step).sum(axis=1) * (second * step).sum(axis=1)
     return Links(tails, heads, weight * _confidence(cosines))

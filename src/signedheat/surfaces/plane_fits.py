@@ -49,7 +49,7 @@ class PlaneFits:
     """Planes fitted near n points."""
 
     axes: Floats  # (n, 3) unit normals, up to sign
-    places: Floats  # (n, 3) the points themselves; if they are noisy, their projections onto the planes
+    points: Floats  # (n, 3) the points themselves; if they are noisy, their projections onto the planes
     reaches: Floats  # (n,) distance to the last neighbour used
     n_neighbors: int  # number of neighbours that each plane was fitted to
     noisy: bool  # whether the points lie around the surface rather than on it
@@ -66,8 +66,8 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
     heights = NOISY_HEIGHTS if noisy else CLEAN_HEIGHTS
     axes, centers, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, on_surface=not noisy)
-    places = points - ((points - centers) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
-    return PlaneFits(axes, places, reaches, size, noisy)
+    projected = points - ((points - centers) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
+    return PlaneFits(axes, projected, reaches, size, noisy)
 
 
 def noisy_sizes(points: Floats, normals: Floats | None = None) -> list[int]:
@@ -155,6 +155,7 @@ def planes_near(
     """
 
     def fit(ids: Ints) -> tuple[Floats, Floats, Floats, Floats]:
+        """Fit planes near points with (k,) ids: normals, centres, reaches and deviations."""
         distances, neighbors = tree.query(tree.data[ids], k=n_neighbors + 1)
         neighbors[:, 0] = ids  # the point itself
         fitted = axes, centers, deviations = np.zeros((len(ids), 3)), points[ids], np.zeros(len(ids))

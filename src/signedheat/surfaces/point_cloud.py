@@ -115,10 +115,12 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @classmethod
     def _of(cls, elements: Elements) -> PointCloud:
+        """Make a cloud of the points of a converted shape."""
         return cls(elements.points, elements.normals, elements.areas)
 
     @property
     def _elements(self) -> Elements:
+        """The points, normals and areas in the form that files and other packages need."""
         if self.points.shape[1] != 3:
             raise GeometryError(
                 f"files and other packages hold points in space, and these have {self.points.shape[1]} coordinates",
@@ -209,6 +211,7 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
         return frozen(normals[self.representatives])
 
     def _triangulation_vertices(self, vertices: Ints) -> Ints:
+        """(n,) first coinciding points of (n,) points, which are vertices of triangles; ids that do not exist stay."""
         exists = (vertices >= 0) & (vertices < self.n_points)
         return np.where(exists, self.representatives[np.where(exists, vertices, 0)], vertices)
 

@@ -101,10 +101,12 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @classmethod
     def _of(cls, elements: Elements) -> PolygonMesh:
+        """Make a mesh of the points and polygons of a converted shape."""
         return cls(elements.points, elements.faces)
 
     @property
     def _elements(self) -> Elements:
+        """The vertices and polygons in the form that files and other packages need."""
         return Elements(self.vertices, self.corners, np.diff(self.offsets))
 
     @property
@@ -180,6 +182,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
         return self.refinement.prolongation @ values
 
     def _triangle_mask(self, face_mask: Bools) -> Bools:
+        """Convert a mask of the polygons to one of their triangles; raise if it does not fit."""
         check_mask(face_mask, self.n_polygons)
         return face_mask[self.refinement.face_polygons]
 

@@ -71,17 +71,20 @@ def segments_of_each(
 
 @segments_of.register
 def _(source: CurveSegments, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
+    """Return segments as they are."""
     return source
 
 
 @segments_of.register
 def _(source: SurfacePoints, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
+    """Locate points; those that coincide become one."""
     located = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
     return CurveSegments.of_points(located[unique_points(located)[0]])
 
 
 @segments_of.register
 def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, number: int = 0) -> CurveSegments:
+    """Cut a curve where it crosses edges; its normals, or else its left, give the side of each segment."""
     name = f"curve {number}"
     located = locate_points(triangles, source.faces, source.barycentric, f"{name}: point")
     start = np.arange(source.n_segments)

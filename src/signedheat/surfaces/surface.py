@@ -163,9 +163,11 @@ class LinearDomain(FieldDomain):
 
     @property
     def _values_shape(self) -> tuple[int, ...]:
+        """A field has one value for each vertex."""
         return (self.n_vertices,)
 
     def _level_set(self, values: Floats, level: float, exact: Exact | None) -> list[Curve]:
+        """Extract a level set of (n,) values as curves; raise `OutsideError` if no value reaches the level."""
         finite = values[np.isfinite(values)]
         low, high = (float(finite.min()), float(finite.max())) if len(finite) else (np.nan, np.nan)
         least = 1e-12 * max(high - low, 0.0)
@@ -195,6 +197,7 @@ class Surface(Frozen, LinearDomain):
         return self.triangulation.n_vertices
 
     def _interpolant(self, values: Floats, beyond: Exact | None) -> SurfaceInterpolant:
+        """Return the function that interpolates (n,) values linearly in the triangles."""
         return SurfaceInterpolant(self.triangulation, self.on_triangulation(values))
 
     def on_triangulation(self, values: Floats) -> Floats:

@@ -68,6 +68,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
 
     @property
     def _elements(self) -> Elements:
+        """The vertices and triangles in the form that files and other packages need."""
         return Elements.of_triangles(self.vertices, self.faces)
 
     @property

@@ -69,6 +69,7 @@ class VectorHeat:
         """Return the stages of one source, from its (n_edges, c) right-hand sides and the first solutions."""
 
         def solve(loads: Complexes) -> Complexes:
+            """(n_edges, c) solutions for the right-hand sides of this source alone."""
             return self._solve(loads[:, None])[:, 0]
 
         return restart(solve, self._border_forces, start, Stage(values, 0.0), float(self.mass.min()))
@@ -181,6 +182,7 @@ def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarra
 
 
 def _components(vectors: np.ndarray) -> np.ndarray:
+    """(..., 2) real and imaginary parts of complex numbers."""
     return np.stack([vectors.real, vectors.imag], axis=-1)
 
 

@@ -138,6 +138,7 @@ def _refuse_too_many(least: float, expected: float, resolution: float, power: in
     """
 
     def lower(fitting: int) -> str:
+        """Return the remedy: a lower resolution, with which there are about `fitting` tets."""
         most = resolution * (fitting / expected) ** (1 / power)
         return (
             f"lower the resolution from {resolution:g} to at most {math.floor(most) if most >= 2 else round(most, 2)}"
@@ -184,6 +185,7 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
     def is_leaf(corner: Ints, size: Ints) -> Bools:
+        """(n,) whether there is a leaf of the given size at each of (n, 3) lower corners."""
         keys = (corner * 32 + np.log2(size).astype(np.int64)[:, None] * [0, 0, 1]) @ stride
         return places_among(leaves, keys) >= 0
 

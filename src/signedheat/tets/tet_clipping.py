@@ -94,6 +94,7 @@ def containing_tets(mesh: TetShapes, planes: Planes, points: Floats) -> Ints:
     """(k,) a tet that contains each of (k, 3) points; −1 outside the mesh."""
 
     def located(chunk: Floats) -> tuple[Ints]:
+        """(k,) tets that contain (k, 3) points."""
         near = mesh.search_tree.meeting(np.repeat(chunk[:, None], 3, axis=1), slack)
         return (_locate(planes, chunk - planes.center, *near),)
 

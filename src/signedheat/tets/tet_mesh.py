@@ -261,24 +261,30 @@ class TetMesh(Displayed, Frozen, FieldDomain):
 
     @property
     def _values_shape(self) -> tuple[int, ...]:
+        """A field has one value for each vertex."""
         return (self.n_vertices,)
 
     def _interpolant(self, values: Floats, beyond: Exact | None) -> TetInterpolant:
+        """Return the function that interpolates (n,) values to second order."""
         return TetInterpolant(self, values)
 
     def _level_set(self, values: Floats, level: float, exact: Exact | None) -> TriangleMesh:
+        """Extract a level set of (n,) values as a mesh that is closed along the boundary."""
         gradients = self.geometry.mean_gradients(values, self.tets, self.n_vertices)
         return TriangleMesh(*closed_level_set(self.geometry, values, gradients, level))
 
     def _values_at_walls(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the values at the vertices of the boundary."""
         return values[np.unique(self.boundary.faces)]
 
     @cached_property
     def _planes(self) -> Planes:
+        """The planes of the faces, by which points are located in tets."""
         return Planes.of(self.geometry)
 
     @cached_property
     def _wall_tree(self) -> TriangleTree:
+        """Search tree over the faces of the boundary."""
         return TriangleTree.of(self.vertices[self.boundary.faces])
 
     def __repr__(self) -> str:

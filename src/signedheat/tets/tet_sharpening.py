@@ -84,6 +84,7 @@ def _(
         return Nearest(np.full(len(values), np.inf), sides)
 
     def measured() -> tuple[Floats, Ints, int]:
+        """Return the results of `_distance_around`."""
         return _distance_around(lowered, points, values, positions, corners, owners)
 
     distances, triangles, hidden = run_cancellable(measured, report)
