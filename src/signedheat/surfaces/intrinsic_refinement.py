@@ -253,7 +253,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
     close = coincide(g, agenda, h)
     if is_hopeless(g, agenda, h) or (close and not is_cap(g, agenda, f)):
         return True
-    outcome, reached, center = find_circumcenter(g, f)  # the place is its face, or the halfedge in the way
+    outcome, reached, center = find_circumcenter(g, f)  # a face, or the halfedge in the way
     if outcome == CENTER_LOST:
         return True
     segment = reached if outcome == CENTER_BLOCKED else encroached(g, agenda, reached, center)
@@ -261,9 +261,7 @@ def improve(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> bool:
         return close or coincide(g, agenda, segment) or split_segment(g, agenda, segment, f, goal)
     n, d = tangent_at(g, preceding(h))
     radius = 0.25 * g.length[g.edge[h]] * (n + d) / np.sqrt(n * d)
-    if (
-        not np.abs(corners_of(g, reached) - center).min() > 0.5 * radius
-    ):  # too near a corner, which only rounding can do
+    if not np.abs(corners_of(g, reached) - center).min() > 0.5 * radius:  # near a corner, as only rounding puts it
         return True
     if not has_room(g, agenda, 2):
         return False
