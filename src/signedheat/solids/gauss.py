@@ -57,8 +57,8 @@ SLENDER_TRIANGLE = 12.0
 dipole must not stand for a strip. An equilateral triangle has 2.3, a strip six times as long as wide 12."""
 MOST_DIPOLES = 200_000
 """Largest number of dipoles; of more faces, this many are drawn evenly."""
-POINTS_TOGETHER = 16
-"""Number of neighbouring points for which dipoles are summed together. Eight take a fifth longer, 32 as long."""
+DIPOLES_TOGETHER = 16
+"""Number of neighbouring dipoles for which the others are summed together. Eight take a fifth longer, 32 as long."""
 WEIGHT_TOLERANCE = 0.02
 """Relative residual up to which the weights of dipoles are solved for. With half of it noisy loose faces take a quarter
 longer, and are no better; with 0.05 a torus with much noise is a quarter worse."""
@@ -388,8 +388,8 @@ class Dipoles:
     def _walk(self) -> Walk:
         """The tree, and the nodes for each group; the same for all products with W."""
         order = self.tree.items[self.tree.items >= 0]
-        nodes = _nodes_for(self.points[order], self.balls, POINTS_TOGETHER)
-        return Walk(self.points, self.softening, self.tree.items, self.balls, order, *nodes, POINTS_TOGETHER)
+        nodes = _nodes_for(self.points[order], self.balls, DIPOLES_TOGETHER)
+        return Walk(self.points, self.softening, self.tree.items, self.balls, order, *nodes, DIPOLES_TOGETHER)
 
     def _at_dipoles(self, kernel: Callable[[Ints], Floats]) -> Floats:
         """(n, ...) values of a kernel at all dipoles; it is given ranges of indices into the order of the tree."""
