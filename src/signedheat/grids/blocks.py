@@ -55,12 +55,12 @@ class Blocks:
         cubes = np.full(tuple(-(-n // (BLOCK * CUBE)) for n in self.shape), -1, dtype=np.int32)
         if not len(self):
             return cubes, np.full((0, CUBE, CUBE, CUBE), -1, dtype=np.int32)
-        places = self.places.astype(np.int64)
-        flat = np.ravel_multi_index(tuple((places // CUBE).T), cubes.shape)
-        taken, number = np.unique(flat, return_inverse=True)
-        cubes.ravel()[taken] = np.arange(len(taken))
-        rows = np.full((len(taken), CUBE, CUBE, CUBE), -1, dtype=np.int32)
-        a, b, c = (places % CUBE).T
+        indices = self.places.astype(np.int64)
+        flat = np.ravel_multi_index(tuple((indices // CUBE).T), cubes.shape)
+        occupied, number = np.unique(flat, return_inverse=True)
+        cubes.ravel()[occupied] = np.arange(len(occupied))
+        rows = np.full((len(occupied), CUBE, CUBE, CUBE), -1, dtype=np.int32)
+        a, b, c = (indices % CUBE).T
         rows[number, a, b, c] = np.arange(len(self))
         return cubes, rows
 
@@ -72,9 +72,9 @@ class Blocks:
         cubes, rows = self.tables
         result = np.full(len(wanted), -1, dtype=np.int32)
         number = cubes[tuple((wanted[inside] // CUBE).T)]
-        held = number >= 0
-        a, b, c = (wanted[inside[held]] % CUBE).T
-        result[inside[held]] = rows[number[held], a, b, c]
+        occupied = number >= 0
+        a, b, c = (wanted[inside[occupied]] % CUBE).T
+        result[inside[occupied]] = rows[number[occupied], a, b, c]
         return result
 
 
@@ -95,9 +95,9 @@ class BlockValues:
         wanted = np.stack(nodes, axis=1)
         row = self.blocks.rows(wanted // BLOCK)
         result = np.full(len(row), np.nan)
-        held = row >= 0
-        a, b, c = (wanted[held] % BLOCK).T
-        result[held] = self.values[row[held], a, b, c]
+        has_block = row >= 0
+        a, b, c = (wanted[has_block] % BLOCK).T
+        result[has_block] = self.values[row[has_block], a, b, c]
         return result
 
     def interpolated(self, points: Floats) -> Floats:

@@ -228,8 +228,8 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         >>> Grid((0, 0), 0.5, (3, 3)).contains([[1.0, 0.2], [1.1, 0.2]])
         array([ True, False])
         """
-        places, shape = query_points(points, self.dimension)
-        return shaped(np.all((places >= self.origin) & (places <= self.upper), axis=1), shape)
+        queries, shape = query_points(points, self.dimension)
+        return shaped(np.all((queries >= self.origin) & (queries <= self.upper), axis=1), shape)
 
     def to_pyvista(self) -> pyvista.ImageData:
         """Convert to an image of PyVista.
@@ -277,8 +277,8 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
 
     def _clipped(self, points: ArrayLike) -> Floats:
         """(..., d) the nearest point of the grid's box for each of (..., d) points."""
-        places, shape = query_points(points, self.dimension)
-        return np.clip(places, self.origin, self.upper).reshape(*shape, self.dimension)
+        queries, shape = query_points(points, self.dimension)
+        return np.clip(queries, self.origin, self.upper).reshape(*shape, self.dimension)
 
     def _level_set(self, values: Floats, level: float, exact: Exact | None) -> TriangleMesh | list[Polyline]:
         """Extract a level set of values at nodes, as a closed mesh in space, or as lines in the plane."""
@@ -336,14 +336,14 @@ class GridInterpolant:
 
     def __call__(self, points: ArrayLike) -> Floats:
         """(...) values at (..., d) points; next to nodes without a value, of the others around; NaN if none has one."""
-        places, shape = query_points(points, self.grid.dimension)
-        (values,) = in_chunks(self._values_at, places)
+        queries, shape = query_points(points, self.grid.dimension)
+        (values,) = in_chunks(self._values_at, queries)
         return shaped(values, shape)
 
     def gradient(self, points: ArrayLike) -> Floats:
         """(..., d) central differences at (..., d) points; outside the grid, those at its nearest point."""
-        places, shape = query_points(points, self.grid.dimension)
-        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), places)
+        queries, shape = query_points(points, self.grid.dimension)
+        (slopes,) = in_chunks(lambda chunk: (self._slopes(self._into_box(chunk)),), queries)
         return shaped(slopes, shape)
 
     def _into_box(self, points: Floats) -> Floats:

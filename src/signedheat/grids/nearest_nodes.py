@@ -169,19 +169,21 @@ def _divide(
     `away`, `best` and `which` are what `_nearest` found for the centres of the boxes. The bound holds since squared
     distance lies above its tangent planes.
     """
-    ways, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
+    nearest_vectors, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
     for e in range(len(best)):
         counts[e] = 0
         for d in range(4):
-            ways[d, e] = away[which[e], d, e]
-        ways[0, e] = best[e] * (1.0 + SQUARE_ROUNDING) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
+            nearest_vectors[d, e] = away[which[e], d, e]
+        nearest_vectors[0, e] = (
+            best[e] * (1.0 + SQUARE_ROUNDING) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
+        )
     a, b, c = 2.0 * half[0], 2.0 * half[1], 2.0 * half[2]
     for at in range(count):
         total = 0
         for e in range(len(best)):
-            low = away[at, 0, e] - a * abs(away[at, 1, e] - ways[1, e])
-            low -= b * abs(away[at, 2, e] - ways[2, e]) + c * abs(away[at, 3, e] - ways[3, e])
-            can[e] = 1 if low <= ways[0, e] else 0
+            low = away[at, 0, e] - a * abs(away[at, 1, e] - nearest_vectors[1, e])
+            low -= b * abs(away[at, 2, e] - nearest_vectors[2, e]) + c * abs(away[at, 3, e] - nearest_vectors[3, e])
+            can[e] = 1 if low <= nearest_vectors[0, e] else 0
             total += can[e]
         if total > 0:
             for e in range(len(best)):

@@ -120,7 +120,10 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
 @sharpen_on.register
 def _(grid: Grid, field: Field[Grid], source: object, method: Method | None, progress: Progress | None) -> Field[Grid]:
-    """Measure the distance of every node to the zero set. A field that holds its solid is returned, up to a factor."""
+    """Measure the distance of every node to the zero set.
+
+    A field that holds its solid is exact already, so that only a factor, if it has one, is removed.
+    """
     if source is not None or method is not None:
         raise UnsupportedTypeError(
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"

@@ -134,11 +134,11 @@ def _are_deep(corners: Floats, pairs: Ints, depths: Floats) -> Bools:
 
     Corners are (m, 9). Pairs with a common vertex are tested as all others.
     """
-    result, ways = np.empty(len(pairs), dtype=np.bool_), np.empty((10, 3))
+    result, directions = np.empty(len(pairs), dtype=np.bool_), np.empty((10, 3))
     for k in range(len(pairs)):
         f, g = pairs[k]
         depth = min(depths[f], depths[g])
-        result[k] = overlap(corners[f], corners[g], -depth, depth, ways)
+        result[k] = overlap(corners[f], corners[g], -depth, depth, directions)
     return result
 
 
@@ -227,7 +227,7 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
     points, faces = indexed(triangles)
     if not len(faces) or (edge_table(faces).balance != 0).any():
         return False
-    made, wrong_area = Windings(triangles), 0.0
+    own_windings, wrong_area = Windings(triangles), 0.0
     for chain, halvings in ((triangles, 0), (windings.triangles, 2)):
         chosen = _spread(len(chain))
         checked, widths = chain[chosen], tolerances(*indexed(chain), SAME_POINT)[chosen]
@@ -236,7 +236,7 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
         wrong = np.arange(len(checked))
         for multiple in TOLERANCES:
             rows, points_beside = _beside(checked[wrong], multiple * widths[wrong])
-            differ = np.abs(made.numbers(points_beside) - windings.inside(points_beside)) > 0.5
+            differ = np.abs(own_windings.numbers(points_beside) - windings.inside(points_beside)) > 0.5
             wrong = wrong[rows[differ.reshape(2, -1).any(axis=0)]]
         wrong_area += float(face_areas(checked[wrong]).sum()) * len(chain) / len(chosen)
     corners = triangles - points.mean(axis=0)

@@ -72,8 +72,8 @@ class Bounding(Frozen):
     def to_turn(self, chain: Chain) -> Bools:
         """(k,) whether each given triangle must be flipped; never those on fewer than three vertices."""
         as_given, turned = (np.append(values, False)[chain.numbers] for values in (self.as_given, self.turned))
-        ways = np.where(as_given, chain.reversed != self.reversed, chain.reversed)
-        return np.asarray((chain.numbers >= 0) & (ways != turned))
+        reversed_as_read = np.where(as_given, chain.reversed != self.reversed, chain.reversed)
+        return np.asarray((chain.numbers >= 0) & (reversed_as_read != turned))
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,12 +328,12 @@ def _nested(
         return outward, 0, 0
     given = np.bincount(pieces, np.sign(counts) * np.sign(chain.multiplicities) * chain.areas, n)
     clear = np.abs(given) >= HINT * np.bincount(pieces, chain.areas, n)
-    way = np.where(given >= 0, 1.0, -1.0)
+    given_sign = np.where(given >= 0, 1.0, -1.0)
     rows, outermost = np.flatnonzero(inner[probes]), np.zeros(n)
-    roots = WindingTree.of(directed(chain.triangles, counts * (way * (depth <= 0))[pieces]))
+    roots = WindingTree.of(directed(chain.triangles, counts * (given_sign * (depth <= 0))[pieces]))
     np.add.at(outermost, probes[rows], roots.numbers(points[rows]))
     by_depth = np.where(depth % 2 == 0, 1.0, -1.0)
-    facing = np.where(clear, outward * way * np.where(outermost >= 0, 1.0, -1.0), by_depth)
+    facing = np.where(clear, outward * given_sign * np.where(outermost >= 0, 1.0, -1.0), by_depth)
     facing = {"given": facing, "cavities": by_depth, "bodies": np.ones(n)}[nested]
     signs = np.where(inner, outward * facing, outward)
     return signs, int((inner & (facing > 0)).sum()), int((inner & (facing < 0)).sum())

@@ -74,8 +74,8 @@ class Chain(Frozen):
     def multiplicities_with(self, reversed: Bools) -> Ints:
         """(m,) multiplicities if `reversed`, (k,), are the given triangles that run opposite to their distinct ones."""
         proper = self.numbers >= 0
-        ways = np.where(reversed[proper], -1, 1)
-        return np.bincount(self.numbers[proper], ways, len(self.faces)).astype(np.int64)
+        signs = np.where(reversed[proper], -1, 1)
+        return np.bincount(self.numbers[proper], signs, len(self.faces)).astype(np.int64)
 
     @cached_property
     def edges(self) -> EdgeTable:

@@ -117,18 +117,18 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
     means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))  # over samples near each place
     positions, corners = samples.positions - loop[0], loop - loop[0]
-    middle, places = means @ samples.normals, means @ positions
+    middle, mean_positions = means @ samples.normals, means @ positions
 
     def covariance(values: Floats) -> Floats:
         """(n, 3, 3) covariances of positions and (k, 3) values over the samples near each point of the rim."""
         products = means @ (positions[:, :, None] * values[:, None]).reshape(-1, 9)
-        return products.reshape(-1, 3, 3) - places[:, :, None] * (means @ values)[:, None]
+        return products.reshape(-1, 3, 3) - mean_positions[:, :, None] * (means @ values)[:, None]
 
-    way = np.cross(middle, along)
-    enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(way, axis=1) > 1e-6)
-    way = unit(way)
-    frame = np.stack([way, unit(np.cross(middle, way))], axis=1)
-    mean = np.einsum("nij,nj->ni", frame, places - corners)
+    across = np.cross(middle, along)
+    enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(across, axis=1) > 1e-6)
+    across = unit(across)
+    frame = np.stack([across, unit(np.cross(middle, across))], axis=1)
+    mean = np.einsum("nij,nj->ni", frame, mean_positions - corners)
     spread = frame @ covariance(positions) @ frame.transpose(0, 2, 1) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
     slopes = np.linalg.solve(spread, frame @ covariance(samples.normals))
     at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
@@ -138,12 +138,12 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     ratio = np.sign(bends * must) * least / np.maximum(most, ANGLE_ROUNDING)
     ratio *= enough
     # 0 on threads, which bend both ways
-    one_way = max(float(ratio.sum()), 0.0) / max(float(np.abs(ratio).sum()), 1e-300)
-    held = one_way * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
+    consistency = max(float(ratio.sum()), 0.0) / max(float(np.abs(ratio).sum()), 1e-300)
+    weights_at_rim = consistency * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
     # no more curvature than the lid needs to cross the opening
     fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), ANGLE_ROUNDING))
     curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
-    return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(held, m), 0.0)
+    return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(weights_at_rim, m), 0.0)
 
 
 def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
@@ -411,29 +411,29 @@ def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints 
     of_loops = turning(surface.vertices[tails], following), surface.behind(tails, tails[following])[0]
     turns, behind = (np.split(values, starts[1:-1]) for values in of_loops)
     for loop, turn, near in zip(surface.loops, turns, behind, strict=True):
-        places = np.flatnonzero(turn)
-        if len(places) < 3:
+        corner_indices = np.flatnonzero(turn)
+        if len(corner_indices) < 3:
             triangles.append(fan(loop))
-        elif bent and len(places) <= LOST_FACE_SIDES:
+        elif bent and len(corner_indices) <= LOST_FACE_SIDES:
             chosen.append(loop)
-            corners.append(places)
-            normals.append(surface.normals[near[places]])
+            corners.append(corner_indices)
+            normals.append(surface.normals[near[corner_indices]])
     if not chosen:
         return np.concatenate(triangles)
-    rims = [loop[places] for loop, places in zip(chosen, corners, strict=True)]
+    rims = [loop[corner_indices] for loop, corner_indices in zip(chosen, corners, strict=True)]
     touching = np.zeros(len(surface.vertices), dtype=bool)
     touching[np.concatenate(rims)] = True
     edges = surface.edges.vertices
     edges = edges[touching[edges].all(axis=1)]
     taken = np.sort(edge_keys(edges[:, 0], edges[:, 1]))
-    for loop, places, lid in zip(
+    for loop, corner_indices, lid in zip(
         chosen,
         corners,
         least_bent(surface.vertices, rims, np.concatenate(normals), taken, LARGEST_BEND),
         strict=True,
     ):
         if len(lid):
-            triangles.append(_with_sides(loop, places, lid))
+            triangles.append(_with_sides(loop, corner_indices, lid))
     return np.concatenate(triangles)
 
 
@@ -502,12 +502,14 @@ def _of_flat_faces(corners: Floats, normals: Floats, bent: bool) -> tuple[Floats
     lid = lids.creased(corners, normals)
     if lid is not None:
         return lid
-    places = corners_of(corners)
-    if len(places) < 3:
+    corner_indices = corners_of(corners)
+    if len(corner_indices) < 3:
         return np.empty((0, 3)), fan(np.arange(len(corners)))
-    if bent and len(places) <= LOST_FACE_SIDES:
-        triangles = least_bent(corners, [places], normals[places], np.empty(0, dtype=np.int64), np.inf)[0]
-        return np.empty((0, 3)), _with_sides(np.arange(len(corners)), places, triangles)
+    if bent and len(corner_indices) <= LOST_FACE_SIDES:
+        triangles = least_bent(corners, [corner_indices], normals[corner_indices], np.empty(0, dtype=np.int64), np.inf)[
+            0
+        ]
+        return np.empty((0, 3)), _with_sides(np.arange(len(corners)), corner_indices, triangles)
     return None
 
 

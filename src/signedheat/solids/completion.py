@@ -56,11 +56,11 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
     Return these (k, 3) points, which are numbered after the vertices, and the (m, 3) triangles of the seams.
     """
     rim, (tails, heads) = boundary(faces), boundary(patches).T
-    starts, ways = vertices[rim[:, 0]], vertices[rim[:, 1]] - vertices[rim[:, 0]]
-    counts = np.maximum(np.ceil(np.linalg.norm(ways, axis=1) / step), 1).astype(np.int64) - 1
+    starts, edge_vectors = vertices[rim[:, 0]], vertices[rim[:, 1]] - vertices[rim[:, 0]]
+    counts = np.maximum(np.ceil(np.linalg.norm(edge_vectors, axis=1) / step), 1).astype(np.int64) - 1
     edges, number = numbered(counts)
     shares = (number + 1) / (counts[edges] + 1)
-    points = starts[edges] + shares[:, None] * ways[edges]
+    points = starts[edges] + shares[:, None] * edge_vectors[edges]
     ids = len(vertices) + np.arange(len(points))
     last = np.append(edges[1:] != edges[:-1], True)[: len(edges)]
     onward = np.where(last, rim[edges, 1], ids + 1)
@@ -356,28 +356,28 @@ def _with_whole_boundary(solid: Solid, mesh: TriangleMesh) -> Solid:
     cut = solid.triangles[solid.bounding]
     if np.array_equal(cut, solid.windings.triangles):
         return solid
-    made = whole_boundary(cut, solid.windings, mesh)
-    if made is None:
+    proven = whole_boundary(cut, solid.windings, mesh)
+    if proven is None:
         return solid
     # what lies on a face of the mesh is part of it; the rest is completion, as sure as the nearest part of it was
     given = np.flatnonzero(face_areas(mesh.vertices[mesh.faces]) > 0)
     tree = FaceTree.of_triangles(mesh.vertices[mesh.faces[given]])
-    faces, squares = tree.nearest(made.mean(axis=1))
-    on = np.sqrt(squares) <= TOLERANCES[-1] * tolerances(*indexed(made), SAME_POINT)
+    faces, squares = tree.nearest(proven.mean(axis=1))
+    on = np.sqrt(squares) <= TOLERANCES[-1] * tolerances(*indexed(proven), SAME_POINT)
     origins = np.where(on, given[tree.features.ids[faces]], -1)
-    confidence, added = np.ones(len(made), dtype=np.float32), solid.origins < 0
+    confidence, added = np.ones(len(proven), dtype=np.float32), solid.origins < 0
     if added.any() and not on.all():
         patches = FaceTree.of_triangles(solid.triangles[added])
-        nearest = patches.features.ids[patches.nearest(made[~on].mean(axis=1))[0]]
+        nearest = patches.features.ids[patches.nearest(proven[~on].mean(axis=1))[0]]
         confidence[~on] = solid.confidence[added][nearest]
     rest = ~solid.bounding
     return replace(
         solid,
-        triangles=np.concatenate([made, solid.triangles[rest]]),
+        triangles=np.concatenate([proven, solid.triangles[rest]]),
         origins=np.concatenate([origins, solid.origins[rest]]),
         confidence=np.concatenate([confidence, solid.confidence[rest]]),
-        bounding=np.append(np.ones(len(made), dtype=bool), np.zeros(int(rest.sum()), dtype=bool)),
-        windings=Windings(made),
+        bounding=np.append(np.ones(len(proven), dtype=bool), np.zeros(int(rest.sum()), dtype=bool)),
+        windings=Windings(proven),
         uncrossed=False,
     )
 
@@ -466,19 +466,19 @@ def _completed_by_heat(
     """
     triangles = vertices[faces]
     given = TriangleGroup(triangles, faces, origins, False)
-    made = heat_surface(TriangleMesh(*indexed(triangles)), method, scatter)
-    if made is None:
+    zero_set = heat_surface(TriangleMesh(*indexed(triangles)), method, scatter)
+    if zero_set is None:
         return [given]
     if scatter:
-        return [TriangleGroup.made(made[0][made[1]])]
+        return [TriangleGroup.made(zero_set[0][zero_set[1]])]
     tree = FaceTree.of_triangles(triangles)
-    patches = made[0][made[1]]
+    patches = zero_set[0][zero_set[1]]
     cell = float(np.median(np.linalg.norm(patches[:, 1] - patches[:, 0], axis=1)))
     is_away = tree.distances(patches.mean(axis=1)) > ZERO_SET_FACES * cell
     if not len(boundary(faces)):
         return [replace(given, closing=True)]
-    all_vertices = np.concatenate([vertices, made[0]])
-    others = made[1][is_away] + len(vertices)
+    all_vertices = np.concatenate([vertices, zero_set[0]])
+    others = zero_set[1][is_away] + len(vertices)
     points, joins = seam_triangles(all_vertices, faces, others, cell)
     all_vertices, whole = np.concatenate([all_vertices, points]), np.concatenate([faces, others, joins])
     whole = np.concatenate([whole, small_gaps(all_vertices, whole)])
@@ -505,16 +505,18 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
 
 
 def _from_points(cloud: PointCloud, method: Heat) -> Solid:
-    """Make the solid that oriented points sample; points that bound nothing become small triangles."""
+    """Make the solid that oriented points sample; if they bound nothing, each becomes a small triangle of a sheet."""
     if cloud.normals is None:
         raise SourceError(
             "the point cloud has no normals, which are needed to tell inside from outside", remedy="give it normals"
         )
     gap = mean_gap(np.asarray(cloud.points))
-    made = heat_surface(cloud, method, gap / CELLS_PER_POINT_GAP)
-    if made is not None:
-        return united([TriangleGroup.made(made[0][made[1]])], True, points=cloud.points)
+    zero_set = heat_surface(cloud, method, gap / CELLS_PER_POINT_GAP)
+    if zero_set is not None:
+        return united([TriangleGroup.made(zero_set[0][zero_set[1]])], True, points=cloud.points)
     first, second = axes_across(cloud.normals)
-    turns = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
-    ways = turns[:, :1] * first[:, None] + turns[:, 1:] * second[:, None]
-    return united([TriangleGroup.made(cloud.points[:, None] + 0.25 * gap * ways, False)], True, points=cloud.points)
+    cosines_and_sines = np.stack([np.cos(2 * np.pi * np.arange(3) / 3), np.sin(2 * np.pi * np.arange(3) / 3)], axis=1)
+    directions = cosines_and_sines[:, :1] * first[:, None] + cosines_and_sines[:, 1:] * second[:, None]
+    return united(
+        [TriangleGroup.made(cloud.points[:, None] + 0.25 * gap * directions, False)], True, points=cloud.points
+    )

@@ -109,8 +109,8 @@ def _way_into(points: Floats, along: Floats, lower: Floats, upper: Floats) -> Fl
     slow = np.where(np.abs(along) > 1e-12, along, 1e-12)
     first, second = (lower - points) / slow, (upper - points) / slow
     enter, leave = np.minimum(first, second).max(axis=1), np.maximum(first, second).min(axis=1)
-    way = np.where(enter <= leave, np.clip(0.0, enter, np.maximum(enter, leave)), 0.0)
-    return way[:, None] * along
+    move = np.where(enter <= leave, np.clip(0.0, enter, np.maximum(enter, leave)), 0.0)
+    return move[:, None] * along
 
 
 def _solved(values: Floats, vectors: Floats, sides: Floats, least: Floats) -> Floats:
@@ -250,24 +250,26 @@ def divided_along_creases(
         if not len(edges):
             break
         away, _ = PointTree(points).query(vertices, distance_upper_bound=CROSS_REACH * float(spacing.max()))
-        divided, made = _divided(vertices, faces, edges, points)
-        new = asked = np.any(made >= len(vertices), axis=1)
+        divided, divided_faces = _divided(vertices, faces, edges, points)
+        new = asked = np.any(divided_faces >= len(vertices), axis=1)
         while len(edges):
-            near = np.flatnonzero(np.append(np.isfinite(away), np.ones(len(points), dtype=bool))[made].any(axis=1))
-            meeting = near[self_intersections(divided, made[near], asked[near])]
+            near = np.flatnonzero(
+                np.append(np.isfinite(away), np.ones(len(points), dtype=bool))[divided_faces].any(axis=1)
+            )
+            meeting = near[self_intersections(divided, divided_faces[near], asked[near])]
             meeting = meeting[new[meeting].any(axis=1)]
             if not len(meeting):
                 break
-            wrong = mask_of(len(divided), made[meeting])[len(vertices) :]
+            wrong = mask_of(len(divided), divided_faces[meeting])[len(vertices) :]
             whole = mask_of(len(faces), edges[wrong] // 3)  # faces that are not divided after all
             edges, points = edges[~wrong], points[~wrong]
-            divided, made = _divided(vertices, faces, edges, points)
-            new = np.any(made >= len(vertices), axis=1)
+            divided, divided_faces = _divided(vertices, faces, edges, points)
+            new = np.any(divided_faces >= len(vertices), axis=1)
             # the others were checked before
             asked = np.append(np.delete(whole, edges // 3), np.zeros(int(new.sum()), dtype=bool))
         if not len(edges):
             break
-        vertices, faces = divided, made
+        vertices, faces = divided, divided_faces
     return vertices, faces
 
 

@@ -418,9 +418,9 @@ def links_of(points: Floats, normals: Floats, owners: Ints) -> Links:
     tails, heads = np.repeat(np.arange(n), k), near.ravel()
     apart = owners[tails] != owners[heads]
     tails, heads = tails[apart], heads[apart]
-    ways = unit(points[heads] - points[tails])
+    directions = unit(points[heads] - points[tails])
     cosines = (normals[tails] * normals[heads]).sum(axis=1)
-    rises = [np.abs((ways * normals[ends]).sum(axis=1)) for ends in (tails, heads)]
+    rises = [np.abs((directions * normals[ends]).sum(axis=1)) for ends in (tails, heads)]
     return Links(tails, heads, np.maximum(0.0, 1.0 - 2.0 * np.maximum(*rises)) * cosines * np.abs(cosines))
 
 
@@ -437,8 +437,8 @@ def agreement(links: Links, shares: Floats, owners: Ints) -> sparse.csr_array:
     size = int(owners.max()) + 1
     sums = sparse.coo_array((weights, (owners[tails], owners[heads])), shape=(size, size)).tocsr()
     sums = sums + sums.T
-    held = np.asarray(abs(sums).sum(axis=1), dtype=np.float64).ravel()
-    return (sparse.diags_array(held) - sums).tocsr()
+    degrees = np.asarray(abs(sums).sum(axis=1), dtype=np.float64).ravel()
+    return (sparse.diags_array(degrees) - sums).tocsr()
 
 
 def spacing(points: Floats) -> Floats:

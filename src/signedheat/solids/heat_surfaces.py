@@ -129,7 +129,7 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 
 @compiled
 def _far_field(points: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
-    """(k,) winding number due to dipoles at (k, 3) places, and (k,) its derivative along an axis.
+    """(k,) winding number due to dipoles at (k, 3) points, and (k,) its derivative along an axis.
 
     Dipoles have (d, 3) positions and (d, 3) area vectors `strengths`; within `core` of one its field is bounded.
     """

@@ -170,13 +170,13 @@ def fill_holes(
     added = np.where(added < given.n_vertices, added, added - virtual)
     points = np.concatenate([given.vertices, points[len(vertices) :]])
     n = given.n_polygons if isinstance(given, PolygonMesh) else given.n_faces
-    made: FilledMesh | FilledPolygonMesh
+    filled_mesh: FilledMesh | FilledPolygonMesh
     if isinstance(given, PolygonMesh):
-        made = FilledPolygonMesh(points, [*given.polygons, *added])
+        filled_mesh = FilledPolygonMesh(points, [*given.polygons, *added])
     else:
-        made = FilledMesh(points, np.concatenate([given.faces, added]))
-    made._set_origins(np.append(np.arange(n), np.full(len(added), -1)), filled, left)
-    return made
+        filled_mesh = FilledMesh(points, np.concatenate([given.faces, added]))
+    filled_mesh._set_origins(np.append(np.arange(n), np.full(len(added), -1)), filled, left)
+    return filled_mesh
 
 
 def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: Ints) -> Bools:
@@ -224,8 +224,8 @@ def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
     if not len(added):
         return added
     table = edge_table(np.concatenate([faces, added]))
-    ways = np.where(turned, -1, 1)
-    votes = np.bincount(table.face_edges[: len(faces)].ravel(), np.repeat(ways, 3), len(table.vertices))
+    signs = np.where(turned, -1, 1)
+    votes = np.bincount(table.face_edges[: len(faces)].ravel(), np.repeat(signs, 3), len(table.vertices))
     own = table.face_edges[len(faces) :]
     parts = element_components(own)
     flipped = np.bincount(np.repeat(parts, 3), votes[own.ravel()])[parts] < 0

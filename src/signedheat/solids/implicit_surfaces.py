@@ -113,13 +113,13 @@ class NodePlanes:
         values, slopes, heights, counts = values[rows], slopes[rows], heights[rows], known[rows]
         offsets = (CELL_CORNERS[None, :] - CELL_CORNERS[:, None]) * self.spacing  # from each corner to the others
         planes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, offsets)
-        errors, places = [], []
+        errors, corners_chosen = [], []
         for sign in (1.0, -1.0):
             hidden = np.where(counts, 0.0, -np.inf)
             highest = (sign * planes + hidden[:, :, None]).max(axis=1)
             errors.append(np.where(counts, np.abs(sign * highest - values), 0.0).sum(axis=1))
-            places.append((sign * heights + hidden).argmax(axis=1))
-        for own, other, place in zip(errors, errors[::-1], places, strict=True):
+            corners_chosen.append((sign * heights + hidden).argmax(axis=1))
+        for own, other, place in zip(errors, errors[::-1], corners_chosen, strict=True):
             clear = np.flatnonzero(own < CLEAR_ERRORS * other)
             mixed[rows[clear]] = heights[clear, place[clear]]
             mean[rows[clear]] = slopes[clear, place[clear]]
@@ -224,7 +224,10 @@ def contour(
 
 
 def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:
-    """Make the level set of a function; without a gradient, it is found by differences that suit its precision."""
+    """Make the level set of a function. If no gradient is given, it is estimated by differences of the function.
+
+    Their steps suit the precision in which the function computes.
+    """
 
     def values(points: Floats) -> Floats:
         """(n,) values of the function above the level at (n, 3) points."""

@@ -458,10 +458,10 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
     """Find the maximal runs of two or more coplanar sides whose lids are not folded back, by area, largest first."""
     n = len(sides)
     starts = points[[side.points[0] for side in sides]]
-    ways = unit(np.roll(starts, -1, axis=0) - starts)
+    directions = unit(np.roll(starts, -1, axis=0) - starts)
     # at corner i: the normal of the plane of sides i − 1 and i, and whether side i + 1 lies in it, too
-    across = unit(np.cross(np.roll(ways, 1, axis=0), ways))
-    goes_on = np.abs((across * np.roll(ways, -1, axis=0)).sum(axis=1)) <= COPLANAR
+    across = unit(np.cross(np.roll(directions, 1, axis=0), directions))
+    goes_on = np.abs((across * np.roll(directions, -1, axis=0)).sum(axis=1)) <= COPLANAR
     begins = np.flatnonzero(~np.roll(goes_on, 1))  # corners whose plane is a new one: a run begins a side earlier
     if not 0 < len(begins) <= MOST_PLANAR_RUNS:
         return []

@@ -213,12 +213,12 @@ def oriented_as(shape: Mesh, owners: Ints, chain: Chain, decided: Bounding) -> O
     sheet &= ~inner & (pieces >= 0)
     weights = np.bincount(owners, areas, n)[kept]
     total = max(float(weights.sum()), np.finfo(float).tiny)
-    names, labels = np.unique(pieces[pieces >= 0], return_inverse=True)
+    part_ids, labels = np.unique(pieces[pieces >= 0], return_inverse=True)
     own, mass = pieces >= 0, weights[pieces >= 0]
-    inwards = np.bincount(labels, np.where(turned[own], mass, -mass), len(names)) > 0
+    inwards = np.bincount(labels, np.where(turned[own], mass, -mass), len(part_ids)) > 0
     closing = np.zeros(len(decided.orientable), dtype=bool)
     closing[decided.pieces] = decided.closed
-    idle = np.bincount(labels, sheet[own], len(names)) > 0
+    idle = np.bincount(labels, sheet[own], len(part_ids)) > 0
     return Orientation(
         shape=_flipped_mesh(shape, kept, turned),
         faces=kept,
@@ -226,14 +226,14 @@ def oriented_as(shape: Mesh, owners: Ints, chain: Chain, decided: Bounding) -> O
         parts=pieces,
         undecided=sheet,
         inner=inner,
-        n_parts=len(names),
-        closed_parts=int(closing[names].sum()),
+        n_parts=len(part_ids),
+        closed_parts=int(closing[part_ids].sum()),
         turned_parts=int((inwards & ~idle).sum()),
         turned_faces=int(turned.sum()),
         turned_area=float(weights[turned].sum()) / total,
         inconsistent_edges=decided.disagreeing,
         nonmanifold_edges=int((chain.edges.face_counts > 2).sum()),
-        nonorientable_parts=int((~decided.orientable[names]).sum()),
+        nonorientable_parts=int((~decided.orientable[part_ids]).sum()),
         undecided_parts=int(idle.sum()),
         undecided_area=float(weights[sheet].sum()) / total,
         merged_faces=n - len(kept),

@@ -115,8 +115,8 @@ def walls(chain: Chain) -> Bools:
         2 * n, 2 * (halfedges // 3) + ~forward[halfedges], 2 * (next_halfedges // 3) + forward[next_halfedges]
     )
     front, back = shells.reshape(n, 2).T
-    ways = np.where(front != back, np.array([[-1], [1]]), 0).ravel()  # an open surface has one shell around it
-    inside = cone_volumes(np.concatenate([chain.triangles] * 2), ways, np.concatenate([front, back]), 2 * n) > 0
+    signs = np.where(front != back, np.array([[-1], [1]]), 0).ravel()  # an open surface has one shell around it
+    inside = cone_volumes(np.concatenate([chain.triangles] * 2), signs, np.concatenate([front, back]), 2 * n) > 0
     return chosen & inside[front] & inside[back]
 
 
@@ -135,8 +135,8 @@ def mixed(chain: Chain, readings: Sequence[Reading], chosen: Ints) -> Reading:
     orientable = np.concatenate([reading.orientable for reading in readings])[used]
     disagreeing = max(reading.disagreeing for reading in readings)
     given = np.append(chosen, 0)[chain.numbers]
-    ways = np.stack([reading.reversed for reading in readings])[given, np.arange(len(given))]
-    return Reading(counts, turned, labels, orientable, disagreeing, ways, whole)
+    reversed_triangles = np.stack([reading.reversed for reading in readings])[given, np.arange(len(given))]
+    return Reading(counts, turned, labels, orientable, disagreeing, reversed_triangles, whole)
 
 
 def unexplained(chain: Chain, counts: Ints, pieces: Ints) -> Floats:

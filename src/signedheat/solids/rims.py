@@ -133,8 +133,8 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
 
 def turning(points: Floats, following: Ints) -> Bools:
     """(n,) whether closed loops change their direction at (n, 3) points; `following` is the next point of each."""
-    ways, turns = unit(points[following] - points), np.empty(points.shape)
-    turns[following] = ways[following] - ways
+    directions, turns = unit(points[following] - points), np.empty(points.shape)
+    turns[following] = directions[following] - directions
     return np.asarray(np.linalg.norm(turns, axis=1) > STRAIGHT_RIM)
 
 
@@ -150,19 +150,19 @@ def meeting_edges(ends: Floats) -> tuple[Ints, Ints]:
     """
     along = ends[:, 1] - ends[:, 0]
     lengths = np.linalg.norm(along, axis=1)
-    ways = along / np.maximum(lengths, 1e-300)[:, None]
-    places, owners = _points_on(ends)
-    tree, reach = PointTree(places), ALONG_EDGE * lengths[owners]
-    crowded = np.flatnonzero(tree.query(places, 2)[0][:, 1] <= reach)  # each place finds itself, too
-    near = tree.query_ball_point(places[crowded], reach[crowded]) if len(crowded) else []
+    directions = along / np.maximum(lengths, 1e-300)[:, None]
+    points, owners = _points_on(ends)
+    tree, reach = PointTree(points), ALONG_EDGE * lengths[owners]
+    crowded = np.flatnonzero(tree.query(points, 2)[0][:, 1] <= reach)  # each point finds itself, too
+    near = tree.query_ball_point(points[crowded], reach[crowded]) if len(crowded) else []
     first = np.repeat(crowded, [len(ids) for ids in near])
     second = np.fromiter(itertools.chain.from_iterable(near), dtype=np.int64, count=len(first))
-    # each place with the edges that it lies along, whichever of the two is the longer
+    # each point with the edges that it lies along, whichever of the two is the longer
     beside = np.unique(np.concatenate([first, second]) * len(ends) + owners[np.concatenate([second, first])])
     pairs, shared = np.unique(owners[beside // len(ends)] * len(ends) + beside % len(ends), return_counts=True)
     pairs = np.stack([pairs // len(ends), pairs % len(ends)], axis=1)[shared >= SHARED_POINTS]
     first, second = np.unique(np.sort(pairs, axis=1), axis=0).T
-    cosines = (ways[first] * ways[second]).sum(axis=1)
+    cosines = (directions[first] * directions[second]).sum(axis=1)
     alike = np.where((cosines < 0)[:, None, None], ends[second, ::-1], ends[second])
     meeting = (np.abs(cosines) > SAME_WAY) & (ends[first] != alike).any(axis=(1, 2))
     return first[meeting], second[meeting]
@@ -174,43 +174,45 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     Edges are given by (n, 2, 3) ends; pairs are two (k,) arrays of their indices. Each sample point on an edge has one
     partner, which is nearest in position and direction. The time is O(n log n).
     """
-    ways, (places, owners) = unit(ends[:, 1] - ends[:, 0]), _points_on(ends)
+    directions, (points, owners) = unit(ends[:, 1] - ends[:, 0]), _points_on(ends)
     partners = np.full((len(ends), EDGE_POINTS), -1)
     sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))
     groups = np.arange(len(ends)) // (1 + len(ends) // MOST_ASKED)
     firsts = np.append(True, groups[1:] != groups[:-1])[: len(ends)]
     for size in np.unique(sizes):
         # directions count so much that no edge finds its own neighbours
-        tree = PointTree(np.concatenate([places / size, 2.0 * ways[owners]], axis=1))
+        tree = PointTree(np.concatenate([points / size, 2.0 * directions[owners]], axis=1))
         # a search that finds nothing takes long: where the first edge of a group finds nothing, no other one asks
         for asking in (firsts, ~firsts):
             met = (partners >= 0).any(axis=1)
             edges = np.flatnonzero((sizes == size) & asking & (firsts | np.isin(groups, groups[met])))
             rows = (EDGE_POINTS * edges[:, None] + np.arange(EDGE_POINTS)).ravel()
-            back = np.concatenate([places[rows] / size, -2.0 * ways[owners[rows]]], axis=1)
+            back = np.concatenate([points[rows] / size, -2.0 * directions[owners[rows]]], axis=1)
             near = tree.query(back, distance_upper_bound=2.0)[1]
-            partners[edges] = np.where(near < len(places), near, -1).reshape(-1, EDGE_POINTS)
-    found = partners.ravel()
-    first = np.flatnonzero(found >= 0)
-    edge, other = owners[first], owners[found[first]]
-    away = places[first] - ends[other, 0]
+            partners[edges] = np.where(near < len(points), near, -1).reshape(-1, EDGE_POINTS)
+    partner = partners.ravel()
+    first = np.flatnonzero(partner >= 0)
+    edge, other = owners[first], owners[partner[first]]
+    away = points[first] - ends[other, 0]
     lengths = np.linalg.norm(ends[other, 1] - ends[other, 0], axis=1)
-    ahead = np.clip((away * ways[other]).sum(axis=1), 0.0, lengths)
-    gaps = np.linalg.norm(away - ahead[:, None] * ways[other], axis=1)
-    kept = (gaps <= np.minimum(reaches[edge], reaches[other])) & ((ways[edge] * ways[other]).sum(axis=1) < -SAME_WAY)
+    ahead = np.clip((away * directions[other]).sum(axis=1), 0.0, lengths)
+    gaps = np.linalg.norm(away - ahead[:, None] * directions[other], axis=1)
+    kept = (gaps <= np.minimum(reaches[edge], reaches[other])) & (
+        (directions[edge] * directions[other]).sum(axis=1) < -SAME_WAY
+    )
     kept &= (ends[edge] != ends[other, ::-1]).any(axis=(1, 2))
     pairs, shared = np.unique(edge[kept] * len(ends) + other[kept], return_counts=True)
     pairs = pairs[shared >= SHARED_POINTS]
     pairs = np.stack([pairs // max(len(ends), 1), pairs % max(len(ends), 1)], axis=1)
-    one, another = np.unique(np.sort(pairs, axis=1), axis=0).T
-    return one, another
+    first_edges, second_edges = np.unique(np.sort(pairs, axis=1), axis=0).T
+    return first_edges, second_edges
 
 
 def _points_on(ends: Floats) -> tuple[Floats, Ints]:
     """Return `EDGE_POINTS` points on each edge, with (n, 2, 3) ends: (k, 3) positions, and (k,) their edges."""
     shares = (np.arange(EDGE_POINTS) + 0.5) / EDGE_POINTS
-    places = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
-    return places.reshape(-1, 3), np.repeat(np.arange(len(ends)), EDGE_POINTS)
+    points = ends[:, :1] + shares[:, None] * (ends[:, 1:] - ends[:, :1])
+    return points.reshape(-1, 3), np.repeat(np.arange(len(ends)), EDGE_POINTS)
 
 
 def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:

@@ -95,9 +95,9 @@ def _cut(pieces: Floats, heights: Floats) -> Floats:
     """(3 n, 3, 3) triangles: each of n is cut in three where the (n, 3) heights of its corners change sign."""
     above = heights > 0
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
-    turn = (alone[:, None] + np.arange(3)) % 3
-    a, b, c = np.take_along_axis(pieces, turn[:, :, None], axis=1).swapaxes(0, 1)
-    up, one, two = np.take_along_axis(heights, turn, axis=1).T[:, :, None]
-    on_b, on_c = a + up / (up - one) * (b - a), a + up / (up - two) * (c - a)
+    order = (alone[:, None] + np.arange(3)) % 3
+    a, b, c = np.take_along_axis(pieces, order[:, :, None], axis=1).swapaxes(0, 1)
+    height_a, height_b, height_c = np.take_along_axis(heights, order, axis=1).T[:, :, None]
+    on_b, on_c = a + height_a / (height_a - height_b) * (b - a), a + height_a / (height_a - height_c) * (c - a)
     parts = [[a, on_b, on_c], [on_b, b, c], [on_b, c, on_c]]
     return np.stack([np.stack(part, axis=1) for part in parts], axis=1).reshape(-1, 3, 3)

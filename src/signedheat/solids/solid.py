@@ -233,11 +233,11 @@ class Solid(Displayed, Represented, Frozen):
             inside = is_signed and self.windings.inside_near(chunk, nearest)
             return (np.where(inside, -nearest.distances, nearest.distances),)
 
-        places, shape = query_points(points, 3)
-        result = np.empty(len(places))
-        for begin in range(0, len(places), POINTS_SORTED):
-            order = begin + order_in_space(places[begin : begin + POINTS_SORTED])
-            (result[order],) = in_chunks(measured, places[order])
+        queries, shape = query_points(points, 3)
+        result = np.empty(len(queries))
+        for begin in range(0, len(queries), POINTS_SORTED):
+            order = begin + order_in_space(queries[begin : begin + POINTS_SORTED])
+            (result[order],) = in_chunks(measured, queries[order])
         return shaped(result, shape)
 
     @public_call
@@ -270,8 +270,8 @@ class Solid(Displayed, Represented, Frozen):
         >>> complete(samples.without_faces(samples.sphere(3), 0.2)).inside([[0.0, 0.0, 0.5], [0.0, 0.0, 2.0]])
         array([ True, False])
         """
-        places, shape = query_points(points, 3)
-        return shaped(self.windings.inside(places), shape)
+        queries, shape = query_points(points, 3)
+        return shaped(self.windings.inside(queries), shape)
 
     @public_call
     def closest(self, points: ArrayLike) -> Closest:
@@ -304,11 +304,11 @@ class Solid(Displayed, Represented, Frozen):
         >>> found.points.round(3).tolist(), found.gradients.round(3).tolist()
         ([[0.0, 0.0, 1.0]], [[0.0, 0.0, 1.0]])
         """
-        places, shape = query_points(points, 3)
-        order = order_in_space(places)
+        queries, shape = query_points(points, 3)
+        order = order_in_space(queries)
         back = np.empty_like(order)
         back[order] = np.arange(len(order))
-        return Closest(*(shaped(values[back], shape) for values in in_chunks(self._closest, places[order])))
+        return Closest(*(shaped(values[back], shape) for values in in_chunks(self._closest, queries[order])))
 
     @public_call
     def field(
@@ -619,8 +619,8 @@ class Solid(Displayed, Represented, Frozen):
         """
         plane, levels = Plane.of(origin, normal), section_levels(heights)
         surface = self.surface() if self.bounding.any() else None
-        found = sections(surface, self.triangles[~self.bounding], plane, levels)
-        return found[0] if heights is None else found
+        cuts = sections(surface, self.triangles[~self.bounding], plane, levels)
+        return cuts[0] if heights is None else cuts
 
     @public_call
     def cut(self, origin: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0)) -> tuple[Solid, Solid]:

@@ -67,8 +67,10 @@ def solid_as_given(mesh: TriangleMesh) -> Solid | None:
         return None
     if len(overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT))):
         return None
-    every, sure = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
-    return Solid(triangles, np.arange(len(faces)), sure, every, Windings(triangles), mesh, uncrossed=True)
+    all_bounding, full_confidence = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
+    return Solid(
+        triangles, np.arange(len(faces)), full_confidence, all_bounding, Windings(triangles), mesh, uncrossed=True
+    )
 
 
 def united(
@@ -82,9 +84,9 @@ def united(
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
-    places, faces = _connected(whole)
-    slacks = tolerances(places, faces, SAME_POINT)
-    pieces, regions = cut_and_sided(partial(_cut, places, faces, closing), slacks, closing, windings)
+    vertices, faces = _connected(whole)
+    slacks = tolerances(vertices, faces, SAME_POINT)
+    pieces, regions = cut_and_sided(partial(_cut, vertices, faces, closing), slacks, closing, windings)
     uncut = np.array_equal(pieces.origins, np.arange(len(whole.triangles)))
     triangles = whole.triangles if uncut else pieces.points[pieces.faces]
     behind, ahead = regions.behind.copy(), regions.ahead.copy()
@@ -105,7 +107,7 @@ def united(
     if not (uncut and bounding.all()):
         windings = _windings_of(triangles[bounding], windings)
     triangles = triangles if kept.all() else triangles[kept]
-    uncrossed = uncut and pieces.points is places  # no two of them met
+    uncrossed = uncut and pieces.points is vertices  # no two of them met
     return Solid(triangles, origins[kept], confidence, bounding[kept], windings, None, diagnostics, uncrossed)
 
 
@@ -182,12 +184,12 @@ def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: F
     the corners of given triangles.
     """
     confidence, given = np.ones(len(triangles), dtype=np.float32), whole.origins >= 0
-    made = np.flatnonzero(~given[owners])
+    added = np.flatnonzero(~given[owners])
     corners = whole.triangles[given].reshape(-1, 3) if points is None else points
-    if not len(made):
+    if not len(added):
         return confidence
     if not len(corners):
-        confidence[made] = 0.5
+        confidence[added] = 0.5
         return confidence
     surfaces = element_components(whole.ids)
     n = int(surfaces.max()) + 1
@@ -196,10 +198,10 @@ def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: F
     np.maximum.at(high, surfaces[given], whole.triangles[given].max(axis=1))
     alone = ~np.isfinite(low).all(axis=1)  # level sets that replace what was given
     low[alone], high[alone] = corners.min(axis=0), corners.max(axis=0)
-    reach = TRUST_DISTANCE * np.linalg.norm(high - low, axis=1)[surfaces[owners[made]]]
-    away = PointTree(corners).query(triangles[made].mean(axis=1))[0]
+    reach = TRUST_DISTANCE * np.linalg.norm(high - low, axis=1)[surfaces[owners[added]]]
+    away = PointTree(corners).query(triangles[added].mean(axis=1))[0]
     trust = reach / np.maximum(reach + away, np.finfo(float).tiny)
-    confidence[made] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
+    confidence[added] = np.minimum(trust, np.nextafter(np.float32(1), np.float32(0)))
     return confidence
 
 
@@ -264,8 +266,12 @@ def halves(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
     room = 2.0 * float(np.linalg.norm(np.ptp(corners, axis=0)))
     steps = np.array(list(np.ndindex(2, 2, 2))) * np.array([2, 2, 1]) - np.array([1, 1, 0])
     sides = (foot + room * steps @ plane.axes)[np.concatenate([BOX_SIDES[:, [0, 1, 2]], BOX_SIDES[:, [0, 2, 3]]])]
-    made, sure, every = np.full(12, -1), np.ones(12, dtype=np.float32), np.ones(12, dtype=np.bool_)
-    half_space = Solid(sides, made, sure, every, Windings(sides))
+    no_origins, full_confidence, all_bounding = (
+        np.full(12, -1),
+        np.ones(12, dtype=np.float32),
+        np.ones(12, dtype=np.bool_),
+    )
+    half_space = Solid(sides, no_origins, full_confidence, all_bounding, Windings(sides))
     front, back = intersection(solid, half_space), difference(solid, half_space)
     return replace(front, source=solid.source), replace(back, source=solid.source)
 

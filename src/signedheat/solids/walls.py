@@ -69,12 +69,12 @@ def seams(rims: list[Rim]) -> list[Ints]:
     onward = np.concatenate([rim.onward[places] for rim, places in zip(rims, corners, strict=True)])
     parts = np.concatenate([rim.parts[places] for rim, places in zip(rims, corners, strict=True)])
     ends = np.stack([starts, starts[following]], axis=1)
-    lengths, ways = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), unit(ends[:, 1] - ends[:, 0])
+    lengths, directions = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), unit(ends[:, 1] - ends[:, 0])
     longest = np.maximum.reduceat(lengths, first)
     reaches = np.maximum([rim.reach for rim in rims], ALONG_EDGE * longest)
     first_sides, second_sides = opposite_edges(ends, reaches[owners])
     across = ends.mean(axis=1)[second_sides] - ends.mean(axis=1)[first_sides]
-    across -= (across * ways[first_sides]).sum(axis=1)[:, None] * ways[first_sides]
+    across -= (across * directions[first_sides]).sum(axis=1)[:, None] * directions[first_sides]
     width, ahead, back = (
         np.linalg.norm(across, axis=1),
         (across * onward[first_sides]).sum(axis=1),

@@ -301,15 +301,15 @@ class Surfels:
 
 def boundary_surfels(volume: Bools) -> Surfels:
     """Return the boundary squares of a volume, in order of their voxels; all beyond the array is outside."""
-    parts, ways = [], [(axis, sign) for axis in range(3) for sign in (-1, 1)]
-    for axis, sign in ways:
+    parts, directions = [], [(axis, sign) for axis in range(3) for sign in (-1, 1)]
+    for axis, sign in directions:
         beyond = np.zeros_like(volume)
         near, far = [slice(None)] * 3, [slice(None)] * 3
         near[axis], far[axis] = (slice(None, -1), slice(1, None))[::sign]
         beyond[tuple(near)] = volume[tuple(far)]
         parts.append(np.argwhere(volume & ~beyond))
     voxel = np.concatenate(parts)
-    along, towards = np.repeat(ways, [len(part) for part in parts], axis=0).T
+    along, towards = np.repeat(directions, [len(part) for part in parts], axis=0).T
     order = np.lexsort((towards, along, *voxel.T[::-1]))
     voxel, along, towards = voxel[order], along[order], towards[order]
 

@@ -265,8 +265,8 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         corners = values[self.faces] if values.ndim == 1 else values
         ids = self._existing(faces)
         sides = np.broadcast_to([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]], (len(ids), 2, 3))
-        places, _, moves = self._forward(ids, barycentric, sides)
-        rises = np.einsum("psk,pk->ps", moves, corners[places])
+        located_faces, _, moves = self._forward(ids, barycentric, sides)
+        rises = np.einsum("psk,pk->ps", moves, corners[located_faces])
         return gradients_along(np.einsum("psk,pkd->psd", sides, self.mesh.vertices[self.mesh.faces[ids]]), rises)
 
     def _existing(self, faces: ArrayLike) -> Ints:

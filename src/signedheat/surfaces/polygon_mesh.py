@@ -226,12 +226,12 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
     whole = area_vectors(np.stack([vertices[tails], vertices[heads], centers[fan_of]], axis=1))
     total = sums_of(whole, fan_of, len(fans))
     part = (whole * total[fan_of]).sum(axis=1)
-    turned = mask_of(len(fans), fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]])
+    flipped_fans = mask_of(len(fans), fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]])
     # what passes a corner twice goes round a hole, which a fan would fill
     order = np.lexsort((tails, fan_of))
     again = (np.diff(tails[order]) == 0) & (np.diff(fan_of[order]) == 0)
-    turned |= mask_of(len(fans), fan_of[order][1:][again])
-    cuts = {k: _cut(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(turned)}
+    flipped_fans |= mask_of(len(fans), fan_of[order][1:][again])
+    cuts = {k: _cut(vertices[corners[polygons == fans[k]]]) for k in np.flatnonzero(flipped_fans)}
     cuts = {k: triangles for k, triangles in cuts.items() if len(triangles)}
     kept = np.ones(len(fans), dtype=bool)
     kept[list(cuts)] = False
@@ -293,10 +293,10 @@ def _cut(polygon: Floats) -> Ints:
     if not normal.any():
         return np.empty((0, 3), dtype=np.int64)
     plane = (around @ np.concatenate(axes_across(normal[None])).T) @ [1, 1j]
-    _, place, copies = np.unique(plane, return_inverse=True, return_counts=True)
-    twice, ways = copies[place] > 1, np.roll(plane, -1) - plane
-    ways /= np.maximum(np.abs(ways), 1e-300)
-    inwards = 1j * (ways + np.roll(ways, 1))[twice]  # along bisectors
+    _, position_ids, copies = np.unique(plane, return_inverse=True, return_counts=True)
+    twice, directions = copies[position_ids] > 1, np.roll(plane, -1) - plane
+    directions /= np.maximum(np.abs(directions), 1e-300)
+    inwards = 1j * (directions + np.roll(directions, 1))[twice]  # along bisectors
     plane[twice] += TWICE_APART * np.abs(plane).max() * inwards / np.maximum(np.abs(inwards), 1e-300)
     triangles = triangulate_polygon(np.stack([plane.real, plane.imag], axis=1), len(plane))
     return np.empty((0, 3), dtype=np.int64) if triangles is None else np.sort(triangles, axis=1)
@@ -308,5 +308,5 @@ def _solve_symmetric(matrices: Floats, loads: Floats) -> Floats:
     The systems of flat polygons are singular along their normals.
     """
     size = np.trace(matrices, axis1=1, axis2=2)
-    held = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
-    return np.linalg.solve(held, loads[..., None])[..., 0].astype(np.float64, copy=False)
+    damped = matrices + (1e-11 * np.where(size > 0, size, 1))[:, None, None] * np.eye(3)
+    return np.linalg.solve(damped, loads[..., None])[..., 0].astype(np.float64, copy=False)

@@ -52,13 +52,13 @@ class RepairedMesh:
         corners = once.places[given.faces]
         kept, targets = np.unique(copied_faces(corners, n), return_inverse=True)
         faces, areas = corners[kept], given.face_areas[kept]
-        turned = orient_faces(faces, areas, n).turned if agree else np.zeros(len(faces), dtype=bool)
+        flipped = orient_faces(faces, areas, n).turned if agree else np.zeros(len(faces), dtype=bool)
         copies = given.n_faces - len(kept)
-        if not (copies or turned.any()):
+        if not (copies or flipped.any()):
             return None
-        faces = np.where(turned[:, None], faces[:, ::-1], faces)
+        faces = np.where(flipped[:, None], faces[:, ::-1], faces)
         to = (corners[:, :, None] == faces[targets][:, None]).argmax(axis=2)
-        notes = *vertices_joined(once), MeshRepaired(int(turned.sum()), copies)
+        notes = *vertices_joined(once), MeshRepaired(int(flipped.sum()), copies)
         return cls(given, TriangleMesh(given.vertices, faces), once.places, targets, to, notes)
 
     def on_it(self, source: Any) -> Any:

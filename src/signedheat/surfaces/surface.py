@@ -596,8 +596,8 @@ def placed(mesh: PlaceableTriangles, points: object) -> tuple[Ints, Floats, tupl
     if isinstance(points, Curve | SurfacePoints):
         refuse_missing("face", points.faces, mesh.n_faces)
         return points.faces, points.barycentric, points.faces.shape
-    places, shape = query_points(points, 3)
-    faces, weights, _ = closest_points(mesh, places)
+    queries, shape = query_points(points, 3)
+    faces, weights, _ = closest_points(mesh, queries)
     return faces, weights, shape
 
 

@@ -242,8 +242,8 @@ class SurfaceIntegration(SpringIntegration):
         points = np.flatnonzero(alone | (np.diff(source.interpolation.indptr) == 1))
         starts = np.concatenate([np.arange(0, 4 * len(ends), 2), 4 * len(ends) + np.arange(len(points) + 1)])
         entries = np.concatenate([along[1].ravel(), np.ones(len(points))]), np.concatenate([along[0].ravel(), points])
-        places = sparse.csr_matrix((*entries, starts), shape=(len(starts) - 1, n))
-        return places, np.concatenate([np.repeat(0.5 * self.strength * lengths, 2), springs[points]])
+        interpolation = sparse.csr_matrix((*entries, starts), shape=(len(starts) - 1, n))
+        return interpolation, np.concatenate([np.repeat(0.5 * self.strength * lengths, 2), springs[points]])
 
     def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
         """(n,) φ with given levels along sources (Eq. 14): exactly along edges, to some hundredths of h in faces."""

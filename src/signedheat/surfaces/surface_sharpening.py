@@ -162,8 +162,8 @@ def nearest_curve(
     counts = [windows]
     is_near = sides.reach <= near * (1 + 1e-9)
     side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
-    turned = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
-    values = np.where(turned, np.copysign(np.minimum(near, reach), side), values)
+    contradicts = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
+    values = np.where(contradicts, np.copysign(np.minimum(near, reach), side), values)
     missing, more = missing_parts(triangles, values, parts, placed, near, sides, spacing, report, reach)
     counts += more
     completed = float(missing.lengths.sum())

@@ -216,8 +216,8 @@ def nonmanifold_frames(
         return triangles, groups
     changed = mask_of(triangles.n_edges, edge[nearest])
     first[edge[nearest]] = side[nearest]
-    turned = replace(triangles, leading_sides=first[first >= 0])
-    return turned, [[mirrored(part, changed) for part in group] for group in groups]
+    reframed = replace(triangles, leading_sides=first[first >= 0])
+    return reframed, [[mirrored(part, changed) for part in group] for group in groups]
 
 
 def mirrored(part: CurveSegments, changed: Bools) -> CurveSegments:
@@ -230,6 +230,6 @@ def _distances(triangles: IntrinsicMesh, parts: Sequence[CurveSegments]) -> Floa
     """(n_vertices,) distance from the sources: straight to the corners of their faces, and then along edges."""
     nodes = concatenated([part.nodes for part in parts])
     corners = triangles.corner_positions[nodes.faces]
-    at = np.einsum("nk,nk->n", nodes.barycentric, corners)
+    positions = np.einsum("nk,nk->n", nodes.barycentric, corners)
     vertices = triangles.corner_vertices[nodes.faces].ravel()
-    return distances_along_edges(triangles, vertices, np.abs(corners - at[:, None]).ravel())
+    return distances_along_edges(triangles, vertices, np.abs(corners - positions[:, None]).ravel())

@@ -60,9 +60,9 @@ class Planes(NamedTuple):
         twice_area = np.linalg.norm(normals, axis=1)
         normals /= np.where(twice_area > 0, twice_area, 1)[:, None]
         signs = np.sign(np.einsum("mki,mki->mk", normals[faces.tet_faces], mesh.area_vectors))
-        turned = inside_out(mesh)
-        signs[turned] *= -1  # so that lines of sight pass through these tets
-        solid = (mesh.thickness > SOURCELESS_TET) & ~turned
+        flipped = inside_out(mesh)
+        signs[flipped] *= -1  # so that lines of sight pass through these tets
+        solid = (mesh.thickness > SOURCELESS_TET) & ~flipped
         counts = np.bincount(faces.tet_faces[solid].ravel(), minlength=len(normals))
         return cls(
             tet_faces=np.ascontiguousarray(faces.tet_faces),

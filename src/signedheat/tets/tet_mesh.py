@@ -303,9 +303,9 @@ class TetInterpolant:
 
     def __call__(self, points: ArrayLike) -> Floats:
         """(...) values at (..., 3) points; NaN where the nearest tet has a vertex without a value."""
-        places, shape = query_points(points, 3)
-        corners, weights, away = self._located(places)
-        steps = (places - away)[:, None] - self.mesh.vertices[corners]
+        queries, shape = query_points(points, 3)
+        corners, weights, away = self._located(queries)
+        steps = (queries - away)[:, None] - self.mesh.vertices[corners]
         tangents = self.values[corners] + np.einsum("pki,pki->pk", self._vertex_gradients[corners], steps) / 2
         values = np.einsum("pk,pk->p", weights, tangents)
         outside = np.flatnonzero(away.any(axis=1))
@@ -316,8 +316,8 @@ class TetInterpolant:
 
     def gradient(self, points: ArrayLike) -> Floats:
         """(..., 3) volume-weighted means of gradients at the vertices, interpolated; outside, at the nearest point."""
-        places, shape = query_points(points, 3)
-        corners, weights, _ = self._located(places)
+        queries, shape = query_points(points, 3)
+        corners, weights, _ = self._located(queries)
         return shaped(np.einsum("pk,pki->pi", weights, self._vertex_gradients[corners]), shape)
 
     @property

@@ -144,13 +144,13 @@ def _distance_around(
     vertices = Vertices(points, unknowns, mesh.faces.neighbors, *_rows_with(unknowns, len(values)))
     surface = SourceSurface(tree.rows, corners, *_rows_with(corners, len(positions)), owners)
     slack = SIGHT_OUTSIDE * lowered.spacing
-    distances, places, hidden = _any_angle(planes, vertices, surface, triangles, slack, Queue.empty(len(points)))
+    distances, feet, hidden = _any_angle(planes, vertices, surface, triangles, slack, Queue.empty(len(points)))
     curved = np.flatnonzero(np.isfinite(distances) & (owners[triangles] >= 0))
-    tets, places = owners[triangles[curved]], places[curved]
-    weights = barycentric(mesh.geometry, tets, places + planes.center)
+    tets, feet = owners[triangles[curved]], feet[curved]
+    weights = barycentric(mesh.geometry, tets, feet + planes.center)
     gradients = mesh.geometry.mean_gradients(np.nan_to_num(values), unknowns, len(values))[unknowns[tets]]
     slope = np.linalg.norm(np.einsum("pk,pki->pi", weights, gradients), axis=1)
-    rise = 0.5 * np.einsum("pk,pki,pki->p", weights, gradients, places[:, None] - points[unknowns[tets]])
+    rise = 0.5 * np.einsum("pk,pki,pki->p", weights, gradients, feet[:, None] - points[unknowns[tets]])
     most = lowered.spacing  # at creases of φ the correction has no meaning
     bend = np.clip(rise / np.where(slope > 0, slope, np.inf), -most, most)
     distances[curved] = np.maximum(distances[curved] + np.copysign(1.0, values[curved]) * bend, 0.0)
@@ -159,8 +159,8 @@ def _distance_around(
 
 def _rows_with(ids: Ints, n: int) -> tuple[Ints, Ints]:
     """(n + 1,) starts, and a list of rows of (m, k) ids: those from ``starts[i]`` to ``starts[i + 1]`` contain id i."""
-    starts, places = grouped(ids.ravel(), n)
-    return starts, places // ids.shape[1]
+    starts, entries = grouped(ids.ravel(), n)
+    return starts, entries // ids.shape[1]
 
 
 @compiled
@@ -175,13 +175,13 @@ def _any_angle(
     points, tets, _, first_tet, tets_at = vertices
     n = len(points)
     distance = np.full(n, np.inf)
-    bend, places = np.full(n, -1), np.zeros((n, 3))
+    bend, feet = np.full(n, -1), np.zeros((n, 3))
     known = np.zeros(n, dtype=np.bool_)
     for v in range(n):
         if nearest[v] >= 0:
             x, y, z = points[v]
-            square, _, places[v, 0], places[v, 1], places[v, 2] = foot_on_triangle(surface.rows, nearest[v], x, y, z)
-            if _sees(planes, vertices, v, places[v], slack):
+            square, _, feet[v, 0], feet[v, 1], feet[v, 2] = foot_on_triangle(surface.rows, nearest[v], x, y, z)
+            if _sees(planes, vertices, v, feet[v], slack):
                 distance[v], known[v] = np.sqrt(square), True
     for i in range(len(surface.rows)):  # each is visible from the corners of its tet, though it may not be the nearest
         for k in range(4):
@@ -191,7 +191,7 @@ def _any_angle(
                 square, _, a, b, c = foot_on_triangle(surface.rows, i, x, y, z)
                 if square < distance[v] ** 2:
                     distance[v], nearest[v] = np.sqrt(square), i
-                    places[v, 0], places[v, 1], places[v, 2] = a, b, c
+                    feet[v, 0], feet[v, 1], feet[v, 2] = a, b, c
                     push(queue, v, distance[v])
     hidden = 0
     for v in range(n):
@@ -213,22 +213,22 @@ def _any_angle(
                     continue
                 x, y, z = points[v]
                 if bend[u] >= 0:
-                    via, triangle, place, length = bend[u], nearest[u], places[u], distance[bend[u]]
+                    via, triangle, foot, length = bend[u], nearest[u], feet[u], distance[bend[u]]
                     target = points[via]
                 else:
-                    triangle, place = _nearest_around(surface, nearest[u], x, y, z)
-                    via, length, target = -1, 0.0, place
+                    triangle, foot = _nearest_around(surface, nearest[u], x, y, z)
+                    via, length, target = -1, 0.0, foot
                 length += _length(target, x, y, z)
                 if length >= distance[v]:
                     continue
                 if not _sees(planes, vertices, v, target, slack):
-                    via, triangle, place, length = u, nearest[u], places[u], distance[u] + _length(points[u], x, y, z)
+                    via, triangle, foot, length = u, nearest[u], feet[u], distance[u] + _length(points[u], x, y, z)
                 if length < distance[v]:
                     distance[v], bend[v], nearest[v] = length, via, triangle
                     for d in range(3):
-                        places[v, d] = place[d]
+                        feet[v, d] = foot[d]
                     push(queue, v, length)
-    return distance, places, hidden
+    return distance, feet, hidden
 
 
 @compiled
@@ -252,15 +252,15 @@ def _sees(planes: Planes, vertices: Vertices, v: int, target: Floats, slack: flo
 @compiled
 def _nearest_around(surface: SourceSurface, triangle: int, x: float, y: float, z: float) -> tuple[int, Floats]:
     """Return the triangle nearest to (x, y, z) of those that share a corner with a given one, and its nearest point."""
-    least, closest, place = np.inf, triangle, np.zeros(3)
+    least, closest, foot = np.inf, triangle, np.zeros(3)
     for c in range(3):
         corner = surface.corners[triangle, c]
         for i in range(surface.first_triangle[corner], surface.first_triangle[corner + 1]):
             square, _, u, v, w = foot_on_triangle(surface.rows, surface.triangles_at[i], x, y, z)
             if square < least:
                 least, closest = square, surface.triangles_at[i]
-                place[0], place[1], place[2] = u, v, w
-    return closest, place
+                foot[0], foot[1], foot[2] = u, v, w
+    return closest, foot
 
 
 @compiled
