@@ -376,7 +376,7 @@ def test_damaged_manifests_are_begun_anew(tmp_path, files):
     texts = [*map(json.dumps, odd), "[" * 100_000, json.dumps({**good, "outputs": ["a\0"]}), "\x00\xff"]
     for text in texts:
         (out / "manifest.jsonl").write_text(text)
-        assert Manifest(out).still_holds("a", folder / "a.ply", good["job"]) is None
+        assert Manifest(out).earlier_outcome("a", folder / "a.ply", good["job"]) is None
     (out / "manifest.jsonl").write_text("\n".join([*texts, json.dumps(good)]))
     assert sh.batches.run(folder, out, measure, workers=1).skipped == 1
 

@@ -16,29 +16,31 @@ from ..io.urdf import meshes_of
 ROBOT = ".urdf"
 """Extension of descriptions of robots."""
 UNSCALED = (1.0, 1.0, 1.0)
+"""Scale of a shape that is used as its file has it."""
 WILDCARDS = frozenset("*?[")
+"""Characters that make a name a pattern."""
 
 
 @dataclass(frozen=True)
 class Input:
-    """A file, and the name of its results: a path without extension, relative to the folder for results."""
+    """The file of a shape in a batch."""
 
     path: Path
-    name: str
-    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # along its axes, as a robot refers to it
+    name: str  # path of its results without extension, relative to the folder for results
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)  # factors along x, y, z, if the description of a robot has some
 
 
 def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None) -> list[Input]:
-    """List every shape among files, folders and patterns once, in order.
+    """List the shapes in files, folders and patterns, in order and without repetitions.
 
     Folders are searched recursively for files with the extension of a shape, except in `results`. Files that are named
-    are taken whatever their extension. A robot (``.urdf``) stands for the meshes that it refers to. Results are named
-    after the files: ``parts/a.stl`` in the folder ``.`` gives ``parts/a``, and files that differ only in extension keep
-    it.
+    themselves are listed whatever their extension. The description of a robot (``.urdf``) stands for the meshes that it
+    refers to. Results are named after the files, so that ``parts/a.stl`` in the folder ``.`` gives ``parts/a``. Files
+    that differ only in extension keep it.
     """
-    paths: dict[str, Path] = {}  # by resolved path, and scale if a robot gives one
-    below: dict[str, str] = {}  # path relative to the folder that was searched, in the same way
-    scales: dict[str, tuple[float, float, float]] = {}
+    paths: dict[str, Path] = {}  # by a key: the resolved path, and the scale if a robot gives one
+    below: dict[str, str] = {}  # path relative to the folder that was searched, by the same key
+    scales: dict[str, tuple[float, float, float]] = {}  # by the same key
     for name in inputs:
         try:
             files, root = _files(named_path(name), results)
@@ -53,10 +55,10 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
                     below.setdefault(key, _name_in_robot(path, root, mesh, scale))
                     scales[key] = scale
                 continue
-            place = os.path.join(os.path.realpath(path.parent), path.name)
+            key = os.path.join(os.path.realpath(path.parent), path.name)
             inner = path.relative_to(root)
-            paths.setdefault(place, path)
-            below.setdefault(place, path.name if ".." in inner.parts else str(inner))
+            paths.setdefault(key, path)
+            below.setdefault(key, path.name if ".." in inner.parts else str(inner))
     if not paths:
         raise FileFormatError("the inputs contain no shape", remedy="name files, folders or patterns")
     names = _names(below)
@@ -66,15 +68,18 @@ def expand(inputs: Iterable[str | os.PathLike[str]], results: Path | None = None
 
 
 def _name_in_robot(robot: Path, root: Path, mesh: Path, scale: tuple[float, float, float]) -> str:
-    """Return the name of a mesh of a robot: in a folder of the robot's name, with its scale if it has one."""
+    """Return a path for a mesh of a robot: in a folder named like the robot's file, with the scale in its name.
+
+    `root` is the folder to which the names of results are relative.
+    """
     folder = robot.relative_to(root).with_suffix("")
     factors = scale[:1] if len({*scale}) == 1 else scale
-    factor = "" if scale == UNSCALED else "_x" + "_".join(f"{each:g}" for each in factors)
-    return str(folder / f"{mesh.stem}{factor}{mesh.suffix}")
+    suffix = "" if scale == UNSCALED else "_x" + "_".join(f"{factor:g}" for factor in factors)
+    return str(folder / f"{mesh.stem}{suffix}{mesh.suffix}")
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """Turn a name into a path; refuse an empty name, as of an unset shell variable, and one with a null character."""
+    """Convert a name to a path; refuse an empty name, as of an unset shell variable, and one with a null character."""
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)
@@ -82,7 +87,10 @@ def named_path(name: str | os.PathLike[str]) -> Path:
 
 
 def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
-    """List the files of an input, and return the folder to which their names are relative."""
+    """Return the files of an input, which is a file, folder or pattern, and the folder to which names are relative.
+
+    Files in the folder `results` are left out.
+    """
     if path.is_dir():
         avoided = None if results is None else os.path.realpath(results)
         if avoided is not None and Path(os.path.realpath(path)).is_relative_to(avoided):
@@ -112,12 +120,12 @@ def _files(path: Path, results: Path | None) -> tuple[list[Path], Path]:
 
 
 def _fail(error: OSError) -> None:
-    """Raise the error that a walk over folders met, which it would pass over."""
+    """Raise an error that `os.walk` would otherwise ignore."""
     raise error  # shapes in a folder that cannot be read must not be skipped silently
 
 
 def _is_hidden(path: Path, pattern: tuple[str, ...]) -> bool:
-    """Whether a part of a name begins with a dot and no part of the pattern does, as in shells."""
+    """Whether a pattern does not match a path as in shells, where names that begin with a dot must be asked for."""
     return any(name.startswith(".") and name != ".." for name in path.parts) and not any(
         part.startswith(".") and part != ".." for part in pattern
     )
@@ -129,11 +137,15 @@ def _is_file_or_broken_link(path: Path) -> bool:
 
 
 def _names(below: dict[str, str]) -> list[str]:
-    """Return a unique name for each file: without extension, or where files share that, with it or with folders."""
-    alike: dict[str, list[str]] = {}
-    for place in below:
-        alike.setdefault(os.path.basename(place).lower(), []).append(os.path.dirname(place))
-    above = [os.path.relpath(place, os.path.commonpath(alike[os.path.basename(place).lower()])) for place in below]
+    """Return a unique name for the results of each file.
+
+    It is the relative path that `below` has for each resolved path, without extension. Files that would share it keep
+    their extension, and if that is shared too, have more folders in the name.
+    """
+    folders: dict[str, list[str]] = {}  # by the name of the files in them
+    for path in below:
+        folders.setdefault(os.path.basename(path).lower(), []).append(os.path.dirname(path))
+    above = [os.path.relpath(path, os.path.commonpath(folders[os.path.basename(path).lower()])) for path in below]
     names = [_without_extension(name) for name in below.values()]
     for longer in (list(below.values()), above):
         count = Counter(name.lower() for name in names)  # file systems may ignore case

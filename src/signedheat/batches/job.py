@@ -1,4 +1,4 @@
-"""Jobs for the shapes of a batch; closed meshes of solids, and how far they are from the faces that were given."""
+"""Jobs for the shapes of a batch, and the measurement of closed meshes against the faces that were given."""
 
 from __future__ import annotations
 
@@ -67,9 +67,9 @@ class Sampling:
     seed : int
         Seed of the random numbers.
     normalize : bool
-        Move and scale the shape into the unit sphere.
+        Whether to move and scale the samples so that the shape lies in the unit sphere.
     layout : "arrays" or "deepsdf"
-        Layout of the file.
+        Layout of the file, as for `Samples.save`.
 
     See Also
     --------
@@ -92,7 +92,7 @@ class Sampling:
 
 @dataclass(frozen=True)
 class Job:
-    """Compute the distance to a shape, and write any of its field, offsets, samples and a report.
+    """A job that computes the distance to a shape, and writes any of its field, offsets, samples and a report.
 
     Attributes
     ----------
@@ -105,21 +105,21 @@ class Job:
     samples : Sampling, optional
         Training points, written to ``NAME.npz``, or to ``NAME_samples.npz`` if ``NAME.npz`` is the field.
     info : bool
-        Report counts and defects of the shape in the manifest, as ``signedheat info`` does.
+        Whether to report counts and defects of the shape in the manifest, as ``signedheat info`` does.
     resolution, spacing, padding
-        The grid around each shape, as for `signed_distance`; by default with room for the offsets.
+        The grid around each shape, as for `signed_distance`, by default with room for the offsets.
     band : float, optional
         Half width of a band, outside of which the grid is coarse, as for `signed_distance`.
     completion, constraint, diffusion, as_oriented, keep_overlaps, lids, nested
-        As for `signed_distance`.
+        How shapes are completed, as for `signed_distance`.
     plain : bool
-        Take the method's own field, not distance to the shape, as with the constraints `EachComponent` and
-        `LevelValues`.
+        Whether to use the field that the method itself gives, not distances measured to the completed shape. That is
+        always so with the constraints `EachComponent` and `LevelValues`.
 
     Raises
     ------
     SignedHeatError
-        If nothing is asked for, samples or a band are asked for of a plain field, offsets lie beyond the band or are
+        If no result is asked for, or a plain field is to have samples or a band, or offsets lie beyond the band or are
         not numbers, or an extension is not known for a field or a surface.
 
     See Also
@@ -190,28 +190,31 @@ class Job:
 
     @property
     def _method(self) -> Heat:
+        """Constraint and diffusion of the method."""
         return Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
 
     @property
     def _completion(self) -> Completion:
+        """How shapes are completed."""
         return Completion(self.completion, self.lids, self.nested, self.as_oriented, self.keep_overlaps)
 
     @property
     def _measures(self) -> bool:
-        """Whether there are results besides `info`."""
+        """Whether results need the distance, which those of `info` do not."""
         return self.volume is not None or bool(self.offsets) or self.samples is not None
 
     @property
-    def _of_samples(self) -> str:
+    def _end_of_samples(self) -> str:
+        """What follows the name of the shape in the name of the file with its samples."""
         return "_samples.npz" if self.volume == ".npz" else ".npz"
 
     def refuse_shared_names(self, shapes: Iterable[Input]) -> None:
-        """Refuse two shapes whose results would have the same name.
+        """Raise an error if results of two shapes would have the same name.
 
         Parameters
         ----------
         shapes : iterable of Input
-            Files, and the names of their results.
+            The shapes of a batch.
 
         Raises
         ------
@@ -229,7 +232,7 @@ class Job:
         """
         endings = [f"_{name}{self.surfaces}" for name in distinct_names(self.offsets)]
         endings += [] if self.volume is None else [self.volume]
-        endings += [] if self.samples is None else [self._of_samples]
+        endings += [] if self.samples is None else [self._end_of_samples]
         owners: dict[str, Input] = {}
         for shape in shapes:
             for ending in endings:
@@ -263,18 +266,19 @@ class Job:
         if surfaces:
             figures["surfaces"] = surfaces
         if self.samples is not None:
-            how = self.samples
-            taken = sample_distances(phi, how.n, near=how.near, widths=how.widths, seed=how.seed)
-            (taken.normalized() if how.normalize else taken).save(f"{stem}{self._of_samples}", how.layout)
-            figures["samples"] = taken.figures
+            options = self.samples
+            samples = sample_distances(phi, options.n, near=options.near, widths=options.widths, seed=options.seed)
+            normalized = samples.normalized() if options.normalize else samples
+            normalized.save(f"{stem}{self._end_of_samples}", options.layout)
+            figures["samples"] = samples.figures
         return figures
 
 
 @dataclass(frozen=True)
 class Watertight:
-    """Write a closed mesh of a shape.
+    """A job that writes a closed mesh of a shape.
 
-    It is that of `Solid.surface`: faces of the shape are kept where they bound the solid and join with its completion.
+    Faces of the shape are kept where they bound the solid and join with its completion, as in `Solid.surface`.
     Elsewhere the surface is contoured with its edges and corners.
 
     Attributes
@@ -282,27 +286,30 @@ class Watertight:
     surfaces : str
         Extension of the files.
     thickness : float, optional
-        Thickness of sheets, which bound nothing themselves: the surface is at half this distance from the shape.
+        Thickness of the solid around sheets, which bound nothing themselves. The surface is at half this distance from
+        the shape.
     contoured : bool
-        Contour the whole surface, which gives more and evenly sized triangles.
+        Whether to contour the whole surface, which gives more and evenly sized triangles.
     tolerance : float, optional
-        Simplify the surface, by no more than this distance.
+        Largest distance by which the surface may move when it is simplified. By default it is not simplified.
     resolution, spacing
-        Contour the whole surface on this grid, as `Solid.surface` does; 256 nodes along the longest side by default.
+        The grid on which to contour the whole surface, as in `Solid.surface`. By default faces are kept, or with
+        `contoured` or `thickness` there are 256 nodes along the longest side.
     seal : float, optional
-        Seal openings narrower than this length, and fill what lies behind them, as `complete` does.
+        Width below which openings are sealed, and what lies behind them is filled, as in `complete`.
     smallest : float, optional
-        Leave out connected parts smaller than this length, as `complete` does.
+        Length below which connected parts are left out, as in `complete`.
     samples : int, optional
         Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
         positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
         near the surface and near sharp edges, and their signed distances.
     normalize : bool
-        Move and scale the samples into the unit sphere.
+        Whether to move and scale the samples so that the shape lies in the unit sphere.
     label : float, optional
-        In an image of labels, take the voxels with this label, in the coordinates of the image.
+        The label of the voxels whose surface is written, if the file is an image of labels. It has the coordinates of
+        the image.
     units : str, optional
-        Unit of all lengths, such as ``"mm"``. Files that state another unit are scaled to it; those that state none
+        Unit of all lengths, such as ``"mm"``. Files that state another unit are scaled to it. Those that state none
         are assumed to be in it already, or, with ``"inch:mm"``, in inches.
 
     See Also
@@ -363,24 +370,24 @@ class Watertight:
         solid = complete(placed, seal=self.seal, smallest=self.smallest)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", InexactWarning)
-            surface, way = self._closed_surface(solid)
+            surface, origin = self._closed_surface(solid)
         with warnings.catch_warnings(record=True) as losses:
             warnings.simplefilter("always", InexactWarning)
             save(surface, f"{stem}{self.surfaces}")
         # of the file, in which coordinates are rounded, and parts that touch are joined
         faults = faults_of(cast("TriangleMesh", read(Path(f"{stem}{self.surfaces}"))))
-        way = "; ".join([way, *(str(loss.message) for loss in losses)])
+        origin = "; ".join([origin, *(str(loss.message) for loss in losses)])
         if self.samples is not None:
-            on, around = training_points(surface, self.samples, self.normalize)
-            write_npz(f"{stem}_surface.npz", **on)
+            on_surface, around = training_points(surface, self.samples, self.normalize)
+            write_npz(f"{stem}_surface.npz", **on_surface)
             write_npz(f"{stem}_sdf.npz", **around)
         notes = [str(note) for note in solid.diagnostics.notes] + [str(warning.message) for warning in caught]
         figures = figures_of(surface, solid, 0.5 * (self.thickness or 0.0))
         units = unit_of(path) if self.units is None else self.units.rpartition(":")[2]
-        return {"way": way, **figures, **faults, "units": units, "notes": notes}
+        return {"way": origin, **figures, **faults, "units": units, "notes": notes}
 
     def _closed_surface(self, solid: Solid) -> tuple[TriangleMesh, str]:
-        """Make a closed surface of a solid, and say how it was made."""
+        """Return a closed surface of a solid, and words on how it was made, such as ``"contoured"``."""
         resolution = CONTOUR_RESOLUTION if self.resolution is None else self.resolution
         contour = partial(solid.surface, spacing=self.spacing, resolution=resolution, tolerance=self.tolerance)
         if self.thickness is not None:
@@ -391,31 +398,35 @@ class Watertight:
         if self.contoured or self.resolution is not None or self.spacing is not None:
             return contour(), "contoured"
         kept = kept_surface(solid)
-        made = kept.mesh if self.tolerance is None else simplified(kept.mesh, self.tolerance)
-        return made, kept.note or "faces kept"
+        mesh = kept.mesh if self.tolerance is None else simplified(kept.mesh, self.tolerance)
+        return mesh, kept.note or "faces kept"
 
 
 CONTOUR_RESOLUTION = 256
-"""Nodes along the longest side for contours that are asked for without a grid."""
+"""Number of nodes along the longest side of the grid for contours, unless a job gives another."""
 SHEET_BOUNDARY = 1e-3
-"""A shape is a sheet if less than this share of its area bounds its solid."""
-PARTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]])
-"""Barycentric coordinates at which distances of a triangle are measured: corners, middles of sides, and centre."""
+"""Fraction of the area of a shape. If less of it bounds the solid, the shape is refused as a sheet."""
+MEASURED_POINTS = np.array(
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3, 1 / 3, 1 / 3]]
+)
+"""(7, 3) barycentric coordinates of points of a triangle whose distances are measured: corners, middles, centre."""
 
 
 def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[str, object]:
-    """Return counts and sizes of a closed surface, and its distances from the faces of a solid and back.
+    """Return counts and sizes of a closed surface, and how far it is from the given faces of a solid, by name.
 
-    The surface should have the distance `level` from the solid: `to_faces` is its largest deviation from that where
-    the nearest face is a given one; `from_faces` is that of given faces, measured from them to the surface.
+    The surface should have the distance `level` from the solid. ``to_faces`` is the largest deviation from that
+    distance, measured from points of the surface whose nearest face was given. ``from_faces`` is the largest deviation
+    measured from points of the given faces.
     """
     corners = surface.vertices[surface.faces]
     volumes = part_volumes(surface.vertices, surface.faces)[1]
     bounds = solid.bounding | (level > 0)
     given, made = solid.triangles[bounds & (solid.origins >= 0)], solid.triangles[bounds & (solid.origins < 0)]
-    closest = solid.closest(_places(corners))
-    off = np.abs(closest.distances - level)[~closest.completed]
-    back = FaceTree.of_triangles(corners).distances(_places(given)) - level if len(given) else np.zeros(1)
+    closest = solid.closest(_measured_points(corners))
+    to_faces = np.abs(closest.distances - level)[~closest.completed]
+    tree = FaceTree.of_triangles(corners)
+    from_faces = tree.distances(_measured_points(given)) - level if len(given) else np.zeros(1)
     return {
         "bodies": int((volumes > 0).sum()),
         "vertices": surface.n_vertices,
@@ -424,25 +435,25 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
         "area": float(face_areas(corners).sum()),
         "openings": _openings(made),
         "completed_area": float(face_areas(made).sum()),
-        "to_faces": float(off.max(initial=0.0)),
-        "from_faces": float(np.abs(back).max(initial=0.0)),
+        "to_faces": float(to_faces.max(initial=0.0)),
+        "from_faces": float(np.abs(from_faces).max(initial=0.0)),
     }
 
 
 def faults_of(surface: TriangleMesh) -> dict[str, object]:
-    """Count pairs of faces that cross, and edges that not exactly two faces share."""
+    """Return the number of pairs of faces that cross, and of edges that not exactly two faces share, by name."""
     return {
         "self_intersections": len(self_intersections(surface.vertices, surface.faces)),
         "bad_edges": surface.n_bad_edges,
     }
 
 
-def _places(triangles: Floats) -> Floats:
-    """Return the positions `PARTS` in each of m triangles, (7 m, 3)."""
-    places: Floats = np.einsum("pk,mkj->mpj", PARTS, triangles).reshape(-1, 3)
-    return places
+def _measured_points(triangles: Floats) -> Floats:
+    """Return the (7 m, 3) points with barycentric coordinates `MEASURED_POINTS` in (m, 3, 3) triangles."""
+    points: Floats = np.einsum("pk,mkj->mpj", MEASURED_POINTS, triangles).reshape(-1, 3)
+    return points
 
 
 def _openings(completion: Floats) -> int:
-    """Count the connected parts of a completion, (m, 3, 3) triangles."""
+    """Return the number of connected parts of a completion, which is (m, 3, 3) triangles."""
     return int(element_components(indexed(completion)[1]).max(initial=-1)) + 1

@@ -18,26 +18,26 @@ State = Literal["done", "failed", "timed out", "died"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of one shape: a line of the manifest.
+    """The outcome of the job for one shape of a batch, which is a line of the manifest.
 
     Attributes
     ----------
     name : str
-        Name of its results, without extension, in the folder of the batch.
+        Path of the results without extension, relative to the folder of the batch.
     input : str
-        Path of the file.
+        Path of the file of the shape.
     state : "done", "failed", "timed out" or "died"
-        How it ended.
+        How the job ended: all results written, an error, stopped at the time limit, or its process died.
     seconds : float
         How long it took.
     message : str
-        The error, or if it is done, what to know before trusting the results.
+        The error, or if all results were written, important notes and warnings about them.
     outputs : tuple of str
         Files of the results, relative to the folder of the batch.
     figures : mapping
-        Figures of quality, as ``--json`` prints them.
+        The dictionary of figures that the job returned, such as sizes and counts.
     job : str
-        The job, and the version of this package.
+        A description of the job, with the version of this package.
     source : tuple of int
         Size of the file in bytes, and its time of modification in nanoseconds.
 
@@ -75,22 +75,25 @@ class Manifest:
         self.path = folder / "manifest.jsonl"
         self.outcomes = _read(self.path)
 
-    def still_holds(self, name: str, path: Path, job: str) -> Outcome | None:
-        """Return the earlier outcome of a shape, if file and job are the same and all results still exist."""
+    def earlier_outcome(self, name: str, path: Path, job: str) -> Outcome | None:
+        """Return the outcome of a shape in an earlier run, or None if it must run again.
+
+        It runs again unless it was done, file and job are the same, and all results still exist.
+        """
         outcome = self.outcomes.get(name)
         if outcome is None or not outcome.is_done or outcome.job != job or outcome.source != source_of(path):
             return None
         return outcome if all((self.path.parent / output).is_file() for output in outcome.outputs) else None
 
     def add(self, outcome: Outcome) -> None:
-        """Append a line, and flush it to disk."""
+        """Append an outcome to the file, and flush it to disk."""
         with writing(self.path), self.path.open("a", encoding="utf-8") as file:
             file.write(_line(outcome))
             file.flush()
             os.fsync(file.fileno())
 
     def write(self, outcomes: Iterable[Outcome]) -> None:
-        """Replace all lines."""
+        """Replace the file by one with these outcomes."""
         with replacing(self.path) as temporary:
             temporary.write_text("".join(map(_line, outcomes)), encoding="utf-8")
 
@@ -104,13 +107,16 @@ def source_of(path: Path) -> tuple[int, int]:
 
 
 def _line(outcome: Outcome) -> str:
-    """Return the line of an outcome, in ASCII if names of files hold line separators or bytes that are not text."""
+    """Return an outcome as a line of JSON.
+
+    It is in ASCII if names of files hold line separators or bytes that are not text.
+    """
     line = json.dumps(asdict(outcome), ensure_ascii=False)
     return (line if line.isprintable() else json.dumps(asdict(outcome))) + "\n"
 
 
 def _read(path: Path) -> dict[str, Outcome]:
-    """Read the last outcome of each name; skip damaged and truncated lines."""
+    """Read the outcomes in a manifest by the name of their results. Later lines count, damaged ones are skipped."""
     outcomes: dict[str, Outcome] = {}
     if not os.path.lexists(path) or (path.is_file() and not path.stat().st_size):
         return outcomes
@@ -122,7 +128,7 @@ def _read(path: Path) -> dict[str, Outcome]:
 
 
 def _outcome(entries: dict[str, Any]) -> Outcome:
-    """Make an outcome of the entries of a line; raise ValueError, TypeError or KeyError if they describe none."""
+    """Convert the entries of a line to an outcome; raise ValueError, TypeError or KeyError if they are damaged."""
     outcome = Outcome(**{**entries, "outputs": tuple(entries["outputs"]), "source": tuple(entries["source"])})
     texts = (outcome.name, outcome.input, outcome.state, outcome.message, outcome.job, *outcome.outputs)
     if not all(isinstance(text, str) and "\0" not in text for text in texts):

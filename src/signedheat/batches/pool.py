@@ -46,27 +46,27 @@ from .job import Job
 from .manifest import Manifest, Outcome, State, source_of
 
 Function = Callable[[Path, Path], Mapping[str, object]]
-"""A job: it takes a file and the common beginning of the names of its results; it returns figures for JSON."""
+"""Type of a job, which is called with a file and the common beginning of the names of results, and returns figures."""
 Done = tuple[Outcome, bool]
-"""The outcome of a task, and whether memory may have run out: then it may succeed once other processes have ended."""
+"""The outcome of a task, and whether memory may have run out, so that it may succeed after other processes ended."""
 PROCESS_DEATHS = (EOFError, OSError, pickle.UnpicklingError)
-"""Exceptions when reading from or writing to a process that has died."""
+"""Exceptions that reading from or writing to a process raises if it has died."""
 THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Environment variables that set the number of threads of a process."""
 
 
 @dataclass(frozen=True)
 class Task:
-    """A job for one shape. Results are written to `scratch` and moved to `folder` once they are complete."""
+    """A job for one shape."""
 
     job: Function
-    description: str
+    description: str  # of the job, for the manifest
     shape: Input
-    folder: Path
-    scratch: Path
+    folder: Path  # to which results are moved once they are complete
+    scratch: Path  # folder in which they are written
 
     def attempt(self) -> Done:
-        """Run the job and turn errors into outcomes."""
+        """Run the job in this process and return its outcome, also if it raises an error."""
         begin, target = time.perf_counter(), self.folder / self.shape.name
         state: State = "failed"
         figures: dict[str, Any] = {}
@@ -95,7 +95,7 @@ class Task:
 
     @contextmanager
     def _scaled(self) -> Iterator[Path]:
-        """Give the file of the shape; a scaled copy, which is deleted afterwards, if a robot scales it."""
+        """Yield the path of the shape, or if a robot scales it, of a scaled copy, which is deleted afterwards."""
         if self.shape.scale == UNSCALED:
             yield self.shape.path.absolute()
             return
@@ -134,14 +134,14 @@ class Task:
 
 
 class Worker:
-    """A process that runs one task after another; it is started at the first task, and again after it has died."""
+    """A process that runs one task after another. It is started at the first task, and again if it has died."""
 
     def __init__(self, threads: int) -> None:
         self.threads, self.is_closed = threads, False
         self._process: subprocess.Popen[bytes] | None = None
 
     def do(self, task: Task, time_limit: float | None) -> Done:
-        """Run a task, and stop it after `time_limit` seconds."""
+        """Run a task in the process and wait for its outcome; kill the process after `time_limit` seconds."""
         try:
             message = pickle.dumps(task)
         except Exception as error:
@@ -170,9 +170,10 @@ class Worker:
         return (task.outcome("failed", 0.0, done), False) if isinstance(done, str) else done
 
     def _ready(self, tries: int = 2) -> subprocess.Popen[bytes]:
-        """Wait until the process can take a task, and return it; if it dies before that, start another one, once.
+        """Return the process once it has announced that it can run a task.
 
-        It dies, for example, while the package is being updated, which has nothing to do with the shape.
+        If it dies before, another one is started, `tries` in all. It may die, for example, while the package is being
+        updated, which is no fault of the shape.
         """
         process = self._process = self._process or self._started()
         try:
@@ -187,13 +188,13 @@ class Worker:
         return process
 
     def stop(self) -> None:
-        """Kill the process and start no other; its current task ends as one whose process died."""
+        """Kill the process for good, from any thread. A task that it was running ends with the state "died"."""
         self.is_closed = True
         if self._process is not None:
             self._process.kill()
 
     def close(self) -> str:
-        """Give the process a second to exit, then kill it, and describe how it ended."""
+        """Kill the process unless it exits within a second, and return words on how it ended."""
         process, self._process = self._process, None
         if process is None:
             return "it was stopped"
@@ -234,7 +235,10 @@ def do_apart(task: Task, threads: int, time_limit: float | None) -> Done:
 
 
 def serve() -> None:
-    """Serve tasks from standard input: announce readiness, run a task and write its result, in turn."""
+    """Run the tasks that arrive on standard input, as the main function of the process of a `Worker`.
+
+    Before each task it writes ``"ready"`` to standard output, and after it what `Task.attempt` returns.
+    """
     signal(SIGINT, SIG_IGN)  # the parent process handles it
     Announcement.are_wanted = False  # what is written to standard error explains failures
     answers = os.fdopen(os.dup(1), "wb")
@@ -255,7 +259,10 @@ def serve() -> None:
 
 
 def _receive(tasks: queue.Queue[Task | str]) -> None:
-    """Queue the tasks that arrive, and exit at once when the parent process closes the pipe or ends."""
+    """Put tasks that arrive into a queue, and end the process when the parent closes the pipe or ends.
+
+    A task that cannot be read becomes a message in the queue.
+    """
     while True:
         try:
             tasks.put(pickle.load(sys.stdin.buffer))
@@ -273,16 +280,16 @@ except ImportError:  # on Windows, two batches in one folder are not detected
 
 @dataclass(frozen=True)
 class Batch:
-    """Outcomes of a batch.
+    """The outcomes of a batch.
 
     Attributes
     ----------
     outcomes : tuple of Outcome
-        One for each shape, in the order of the inputs.
+        The outcome for each shape, in the order of the inputs.
     manifest : Path
-        The file that holds the outcomes, a line of JSON each.
+        The file with the outcomes, each on a line of JSON.
     skipped : int
-        Number of shapes that an earlier run had done.
+        Number of shapes that were skipped, since an earlier run had done them.
 
     See Also
     --------
@@ -302,7 +309,7 @@ class Batch:
 
     @property
     def failures(self) -> list[Outcome]:
-        """Outcomes of the shapes that are not done."""
+        """The outcomes of shapes for which not all results were written."""
         return [outcome for outcome in self.outcomes if not outcome.is_done]
 
     def __repr__(self) -> str:
@@ -325,9 +332,9 @@ def run(
     """Run one job on many shapes in worker processes, and record the outcomes in a manifest.
 
     A shape that fails, takes too long or kills its process does not stop the others. If memory ran out, the shape is
-    tried once more, alone, after the others. A batch can be started again after it was stopped or with more inputs: it
-    skips each shape whose file has not changed, if the same version has done the same job and the results still exist.
-    Results do not depend on the number of workers.
+    tried once more, alone, after the others. A batch can be started again after it was stopped, or with more inputs.
+    It then skips each shape whose file has not changed, if the same version of this package has done the same job and
+    the results still exist. Results do not depend on the number of workers.
 
     Parameters
     ----------
@@ -337,14 +344,15 @@ def run(
         Folder for the results, which are named after the inputs, and for ``manifest.jsonl``, which has a line of JSON
         for each shape with its state, seconds, message and figures of quality.
     job : Job, Watertight, or callable
-        Called for each shape as ``job(path, stem)``: writes files whose names begin with `stem`, and returns a
-        dictionary of figures. The workers must be able to import it.
+        The job, called for each shape as ``job(path, stem)``. It writes files whose names begin with `stem`, and
+        returns a dictionary of figures for the manifest. The workers must be able to import it.
     workers : int, optional
         Number of processes. By default, one for each processor.
     threads : int
         Threads of each process.
     scheduler : str, optional
-        Address of a running Dask cluster, ``tcp://host:port``. Its workers must see the same files at the same paths.
+        Address of a running Dask cluster, such as ``tcp://host:port``, which runs the job instead of this machine. Its
+        workers must see the same files at the same paths.
     time_limit : float, optional
         Seconds after which a shape is abandoned.
     progress : callable, optional
@@ -392,15 +400,15 @@ def run(
     shapes = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
     if isinstance(job, Job):
         job.refuse_shared_names(shapes)
-    whatever = _described(job)
+    description = _description_of(job)
 
     def described(shape: Input) -> str:
-        return whatever if shape.scale == UNSCALED else f"{whatever} of {shape.scale} times the shape"
+        return description if shape.scale == UNSCALED else f"{description} of {shape.scale} times the shape"
 
     with ExitStack() as stack:
         scratch = stack.enter_context(_locked(target))
         manifest = Manifest(target)
-        earlier = {shape.name: manifest.still_holds(shape.name, shape.path, described(shape)) for shape in shapes}
+        earlier = {shape.name: manifest.earlier_outcome(shape.name, shape.path, described(shape)) for shape in shapes}
         done = {name: outcome for name, outcome in earlier.items() if outcome is not None}
         skipped = len(done)
         manifest.write(done.values())
@@ -436,15 +444,15 @@ def run(
     return Batch(outcomes_in_order, manifest.path, skipped)
 
 
-def _described(job: Function) -> str:
-    """Describe a job and the version of the package; shapes done under another description are done again."""
+def _description_of(job: Function) -> str:
+    """Return words for a job and the version of the package. Shapes done under other words are done again."""
     text = f"{job.__module__}.{job.__qualname__}" if isinstance(job, FunctionType) else repr(job)
     package = __name__.partition(".")[0]
     return f"{text} by {package} {import_module(package).__version__}"
 
 
 def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
-    """Refuse numbers of processes, threads and seconds that are out of range."""
+    """Raise an error if numbers of processes, threads or seconds are out of range."""
     for name, number in (("workers", 1 if workers is None else workers), ("threads", threads)):
         if whole_number(number, name, 1, SignedHeatError) > MOST_THREADS:
             raise SignedHeatError(f"{name} must be at most {MOST_THREADS}, not {number}", element=name)
@@ -455,7 +463,10 @@ def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[Path]:
-    """Make a folder, lock it against other batches, and yield an empty scratch folder in it."""
+    """Make a folder, lock it against other batches, and yield the path of a scratch folder in it.
+
+    The scratch folder does not exist at the beginning, and is deleted at the end.
+    """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -480,7 +491,10 @@ def _locked(folder: Path) -> Iterator[Path]:
 def _in_processes(
     tasks: list[Task], number: int, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Yield outcomes as tasks end; those that ran out of memory or died are tried once more at the end, alone."""
+    """Run tasks in at most `number` processes, and yield outcomes as tasks end.
+
+    Those that ran out of memory or died are tried once more at the end, one after another.
+    """
     starved = []
     workers = [Worker(threads) for _ in range(max(1, min(number, len(tasks))))]
     idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
@@ -517,7 +531,7 @@ def _in_processes(
 def _on_cluster(
     tasks: list[Task], address: str, threads: int, time_limit: float | None
 ) -> Generator[Outcome, None, None]:
-    """Yield outcomes as tasks end on a Dask cluster, each in a separate process of a Dask worker."""
+    """Run each task in a separate process of a Dask worker, and yield outcomes as tasks end."""
     with connected(address) as client:
         pool = client.get_executor(pure=False)
         futures = {pool.submit(do_apart, task, threads, time_limit): task for task in tasks}
@@ -531,7 +545,7 @@ def _on_cluster(
 
 
 def duration(seconds: float) -> str:
-    """Write a number of seconds in seconds, minutes or hours."""
+    """Return a time in words, such as ``"12 s"``, ``"5 min"`` or ``"2.0 h"``."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
