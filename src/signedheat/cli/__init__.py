@@ -49,7 +49,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(argv: Sequence[str] | None) -> int:
-    """Import the commands, inside the caller's error handling, and run one."""
+    """Run the command that the arguments name, and return the exit status. Commands are imported only now.
+
+    `main` handles errors of the import, too.
+    """
     parser = _parser()
     if "_ARGCOMPLETE" in os.environ:  # set by argcomplete's shell function
         import_module("argcomplete").autocomplete(parser)
@@ -78,19 +81,19 @@ def _run(argv: Sequence[str] | None) -> int:
 
 @cache
 def _parser() -> Parser:
-    """Make the parser of the whole command line, once."""
+    """Return the parser of the whole command line, which is made once."""
     return parser_of(import_module(f"{__name__}.shell").COMMANDS)
 
 
 def _say_warning(message: Warning | str, category: type[Warning], *_: object, **__: object) -> None:
-    """Print a warning on one line, except deprecation warnings of other packages."""
+    """Print a warning on one line, as `warnings.showwarning`; deprecation warnings are not printed by default."""
     if sys.warnoptions or not issubclass(category, DeprecationWarning | PendingDeprecationWarning):
         say(printable(f"signedheat: {' '.join(str(message).split())}"))
 
 
 @contextmanager
 def _warnings_in_lines() -> Iterator[None]:
-    """Print each warning on one line, without its place in the code."""
+    """Within a ``with`` block, print each warning on one line, without its position in the code."""
     with warnings.catch_warnings():
         if not sys.warnoptions:
             warnings.simplefilter("default", UserWarning)
@@ -99,12 +102,12 @@ def _warnings_in_lines() -> Iterator[None]:
 
 
 def _is_expected(error: BaseException) -> bool:
-    """Whether an error is due to the input or the system, rather than a bug."""
+    """Whether an error is due to the input or the system, and not a bug of this package."""
     return isinstance(error, SignedHeatError | MemoryError | OSError | Warning)
 
 
 def _one_line(error: BaseException) -> str:
-    """Describe an error in one line; an unexpected one is called a bug, with its place in the code."""
+    """Return a description of an error in one line. Unexpected errors are called bugs, with their position in code."""
     if isinstance(error, MemoryError):
         return "there is not enough memory: choose a lower resolution or a smaller shape"
     if _is_expected(error):

@@ -50,7 +50,7 @@ MANY_SHAPES = (
     workers("processes (one for each processor)"),
     option("--time-limit", type=positive, metavar="S", help="seconds after which a shape is abandoned"),
 )
-"""Options of commands on many shapes."""
+"""Options that both commands on many shapes have."""
 WANTED_RESULTS = group(
     "results for each shape, at least one of",
     option("--volume", nargs="?", const="npz", choices=("npz", "vti", "nrrd", "npy", "vdb"), help="the field (npz)"),
@@ -66,7 +66,7 @@ RUNNING = group(
 
 
 def check_batch(arguments: Namespace) -> None:
-    """Reject a batch without results, contradictory results, and options for distances if none are computed."""
+    """Exit with an error if no results are asked for, they contradict each other, or options have no effect on them."""
     try:
         job_of(arguments)
     except SignedHeatError as problem:
@@ -88,9 +88,9 @@ def check_batch(arguments: Namespace) -> None:
     usage="FILE [FILE ...] -o FOLDER [--volume] [--offset D ...] [--sample] [--info] [options]",
 )
 def batch(arguments: Namespace) -> Summary:
-    """Run the job on every shape."""
+    """Run the job that the options describe on every shape, and return the manifest and how many shapes are done."""
     options = {"threads": arguments.threads, "scheduler": arguments.scheduler}
-    done = made_of_each(arguments, arguments.output, job_of(arguments), **options)
+    done = run_on_each(arguments, arguments.output, job_of(arguments), **options)
     states = [outcome.state for outcome in done.outcomes]
     counts = {state: states.count(state) for state in dict.fromkeys(states)}
     seconds = sum(outcome.seconds for outcome in done.outcomes)
@@ -116,7 +116,7 @@ def names_file(output: str) -> bool:
 
 
 def check_watertight(arguments: Namespace) -> None:
-    """Take the format of the surface from the name of an output file; reject ``--surface`` with another one."""
+    """Set ``--surface`` to the format in the name of an output file; exit with an error if another one is given."""
     if names_file(arguments.output):
         ending = Path(arguments.output).suffix.lower().lstrip(".")
         if ending not in SURFACE_FILES:
@@ -160,7 +160,7 @@ def check_watertight(arguments: Namespace) -> None:
     usage="FILE [FILE ...] -o OUT [options]",
 )
 def watertight(arguments: Namespace) -> Summary:
-    """Write the closed mesh of each shape, and print a line about each."""
+    """Write the closed mesh of each shape to a file or a folder, and print a line about each."""
     job = sh.batches.Watertight(
         surfaces=f".{arguments.surface or 'stl'}",
         thickness=arguments.thickness,
@@ -177,7 +177,7 @@ def watertight(arguments: Namespace) -> Summary:
     )
     if names_file(arguments.output):
         return one_watertight(arguments, job)
-    done = made_of_each(arguments, arguments.output, job, in_words)
+    done = run_on_each(arguments, arguments.output, job, in_words)
     summary = {
         "inputs": arguments.inputs,
         "manifest": str(done.manifest),
@@ -199,7 +199,7 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
         )
     sh.io.ensure_writable(target, {target.suffix.lower()}, "a surface")
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.stem}-") as folder:
-        done = made_of_each(arguments, folder, job)
+        done = run_on_each(arguments, folder, job)
         (outcome,) = done.outcomes
         stem = Path(outcome.name).name
         written = []
@@ -218,8 +218,8 @@ def one_watertight(arguments: Namespace, job: sh.batches.Watertight) -> Summary:
 
 
 def in_words(figures: dict[str, object]) -> str:
-    """Describe the figures of a closed mesh in one line."""
-    bodies, openings, meeting = (figures[key] for key in ("bodies", "openings", "self_intersections"))
+    """Return the figures of a closed mesh that `signedheat.batches.Watertight` returns as a line of text."""
+    bodies, openings, crossings = (figures[key] for key in ("bodies", "openings", "self_intersections"))
     bad_edges = (
         f"{counted(int(str(figures['bad_edges'])), 'edge')} that two faces do not share, "
         if figures["bad_edges"]
@@ -232,20 +232,21 @@ def in_words(figures: dict[str, object]) -> str:
         f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {volume}, {figures['faces']} faces, "
         f"{openings} {'opening' if openings == 1 else 'openings'} completed ({percent(share, 2)} of the area), "
         f"{figures['to_faces']:.2g}{unit} from the faces and {figures['from_faces']:.2g}{unit} back at most, "
-        f"{bad_edges}{meeting or 'no'} self-intersections; {figures['way']}"
+        f"{bad_edges}{crossings or 'no'} self-intersections; {figures['way']}"
     )
 
 
-def made_of_each(
+def run_on_each(
     arguments: Namespace,
     folder: str,
     job: Callable[[Path, Path], Mapping[str, object]],
     line: Callable[[dict[str, object]], str] | None = None,
     **options: Any,
 ) -> sh.batches.Batch:
-    """Run a job on every shape, and report those that fail on standard error.
+    """Run a job on every input with its results in a folder, and report shapes that fail on standard error.
 
-    `line` describes a shape that is done from its figures; `options` go to `signedheat.batches.run`.
+    If `line` is given, it returns a line to print for each shape that is done, from the figures of the job. `options`
+    are further arguments of `signedheat.batches.run`.
     """
     with ProgressBar(is_quiet(arguments)) as progress:
 
@@ -270,7 +271,7 @@ def made_of_each(
 
 
 def listed(inputs: list[str]) -> list[str]:
-    """Return the inputs, with ``-`` replaced by the lines of standard input."""
+    """Return the names of inputs, with ``-`` replaced by the names on the lines of standard input."""
     if "-" not in inputs:
         return inputs
     lines = [line.rstrip("\r\n") for line in (sys.stdin or ()) if line.strip()]
@@ -281,7 +282,7 @@ def listed(inputs: list[str]) -> list[str]:
 
 
 def job_of(arguments: Namespace) -> sh.batches.Job:
-    """Return the job that the options describe."""
+    """Return the job that the options of `batch` describe."""
     sampling = None
     if arguments.sample is not None:
         named = {name: getattr(arguments, name) for name in ("near", "seed", "normalize", "layout")}

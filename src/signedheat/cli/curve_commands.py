@@ -34,7 +34,7 @@ from .terminal import ProgressBar
 
 
 def about_curves(written: str) -> tuple[Option, ...]:
-    """Return the arguments of commands that measure distance to curves on a surface."""
+    """Return the arguments and options of commands about curves on a surface; `written` is the help for the output."""
     return (
         option(
             "mesh",
@@ -75,7 +75,7 @@ def about_curves(written: str) -> tuple[Option, ...]:
 
 
 def check_curves(arguments: Namespace) -> None:
-    """Reject ``--as-oriented`` if curves are taken as they are anyway, and ``--contours`` with standard output."""
+    """Exit with an error if ``--as-oriented`` has no effect, or ``--contours`` is given with standard output."""
     refuse_together(arguments, "--as-oriented", WITHOUT_COMPLETION)
     if arguments.output == "-" and is_given(arguments, "--contours"):
         arguments.parser.error("--contours writes a file next to the output: name a file instead of standard output")
@@ -104,7 +104,7 @@ def check_curves(arguments: Namespace) -> None:
     check=check_curves,
 )
 def surface(arguments: Namespace) -> Summary:
-    """Write the distance to curves on a surface, and its isolines if they are asked for."""
+    """Write the distance to curves on a surface, and with ``--contours`` its isolines."""
     sh.io.ensure_writable(arguments.output, sh.io.VERTEX_FIELD_FORMATS, "a field on a surface")
     domain, sources = surface_and_curves(arguments)
     field = distance_on_surface(domain, sources, arguments)
@@ -137,7 +137,7 @@ def surface(arguments: Namespace) -> Summary:
         text += f", {counted(summary['unreached'], 'vertex')} without any source"
     if summary.get("completed"):
         text += f", {percent(summary['completed'])} of the curve completed"
-    text = _with_pieces(field, summary, text)
+    text = _with_curve_counts(field, summary, text)
     angles = None if measured_to is not None else field.diagnostics.note(diagnostics.LargeAngles)
     return summary, text + (f"; {angles}: --intrinsic is more accurate" if angles else "")
 
@@ -183,13 +183,13 @@ def close(arguments: Namespace) -> Summary:
         "n_closed": closed,
     }
     curve = "curve" if len(completed) == 1 else "curves"
-    return summary, _with_pieces(
+    return summary, _with_curve_counts(
         field, summary, f"{printable(arguments.output)}: {len(completed)} {curve}, {closed} of them closed"
     )
 
 
 def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
-    """Return the surface, and the curves on it."""
+    """Read the surface of a command, and the curves and points on it."""
     domain: Any = sh.as_shape(sh.read(arguments.mesh))
     kind = type(domain).__name__
     if not hasattr(domain, "triangulation"):
@@ -207,7 +207,7 @@ def surface_and_curves(arguments: Namespace) -> tuple[Any, list[Any]]:
 
 
 def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -> sh.Field[Any]:
-    """Return the distance to the curves."""
+    """Return the distance on a surface to curves and points, as the options say."""
     constraint = shapes.constraint_of(arguments.constraint)
     intrinsic: Literal[True, "auto"] = True if arguments.intrinsic else "auto"
     field: sh.Field[Any]
@@ -232,8 +232,8 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
     return field
 
 
-def _with_pieces(field: sh.Field[Any], summary: dict[str, Any], text: str) -> str:
-    """Add the curves that were flipped or left out to a summary and its text."""
+def _with_curve_counts(field: sh.Field[Any], summary: dict[str, Any], text: str) -> str:
+    """Add the numbers of curves that were flipped or left out to a summary, and return `text` with them."""
     note = field.diagnostics.note(distance.CurvesTaken)
     if note is None:
         return text

@@ -60,8 +60,8 @@ def surfaces() -> None:
     curve = _curve(ball)
     field = sh.SignedHeatSolver(ball).distance([curve, ball.points_at(3)])
     field.contour(0.1)
-    for how in (None, sh.methods.Convex(), sh.methods.Geodesic()):
-        sh.sharpen(field) if how is None else sh.sharpen(field, method=how)
+    for method in (None, sh.methods.Convex(), sh.methods.Geodesic()):
+        sh.sharpen(field) if method is None else sh.sharpen(field, method=method)
     sh.sharpen(sh.SignedHeatSolver(ball).distance(sh.Curve(curve.faces, curve.barycentric, oriented=False)))
 
 
@@ -94,6 +94,7 @@ def tets() -> None:
 
 
 def _curve(ball: sh.TriangleMesh) -> sh.Curve:
+    """Return an open curve on a unit sphere."""
     return ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
 
 
@@ -107,4 +108,4 @@ JOBS: dict[str, Callable[[], None]] = {
     "reports": reports,
     "lines in the plane": plane,
 }
-"""Jobs, the longest first, which share few kernels. Of 100 s of processor time, the first takes 36, the second 27."""
+"""Functions of this module by what they run, the slowest first. They share few compiled functions."""

@@ -1,4 +1,4 @@
-"""From the arguments of a command to shapes, images, grids and fields, and from these to files."""
+"""Make shapes, images, grids and fields from the arguments of a command, and write results to files."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from .options import IMAGES, METHOD, REPAIR, is_given, is_planar, is_quiet
 from .terminal import ProgressBar, say
 
 CANCELLED_AREA = 0.9
-"""Fraction of the area that may cancel without a warning."""
+"""Fraction of the area that may cancel. Above it, `hint_of_doubled_faces` says so."""
 MOST_LABELS = 40
-"""Images with at most this many different whole numbers are images of labels."""
+"""Images with at most this many different values, all whole numbers, are images of labels. Others are fields."""
 
 
 @contextmanager
 def prefix_errors(path: Any) -> Iterator[None]:
-    """Prefix the messages of errors with the name of the input."""
+    """Within a ``with`` block, prefix the messages of errors that name no file with the name of the input."""
     try:
         yield
     except SignedHeatError as error:
@@ -59,7 +59,7 @@ def read_lines(arguments: Namespace) -> list[sh.Polyline]:
 
 
 def read_shape(arguments: Namespace, path: str) -> Any:
-    """Read a shape in space, and place it."""
+    """Read a shape in space, scaled and transformed as the options say. Voxels become their smooth surface."""
     shape = sh.read(path)
     if isinstance(shape, sh.Solid) and path == arguments.shape:
         refuse_completing(arguments)
@@ -71,7 +71,7 @@ def read_shape(arguments: Namespace, path: str) -> Any:
 
 
 def refuse_completing(arguments: Namespace) -> None:
-    """Refuse options that have no effect on a solid."""
+    """Raise an error if options are given that have no effect on a solid, since it needs no completion."""
     for option in (*REPAIR.options, *(() if arguments.plain else METHOD.options)):
         if is_given(arguments, option.names[-1]):
             raise SourceError(
@@ -83,9 +83,10 @@ def refuse_completing(arguments: Namespace) -> None:
 
 
 def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
-    """Find the unit of printed and written lengths, from ``--units`` or the files; None if it is unknown.
+    """Return the unit of printed and written lengths, from ``--units`` or the files; None if it is unknown.
 
-    Where only some files state one, or they state different ones, the first counts for all.
+    If only some files state a unit, or they state different ones, the first unit is stored as ``--units``, so that all
+    files are scaled to it.
     """
     if arguments.units is None:
         stated = [unit_of(path) for path in paths]
@@ -95,18 +96,21 @@ def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
     return str(arguments.units.rpartition(":")[2])
 
 
-def named(unit: str | None, power: str = "") -> str:
-    """Return a unit to print after a length, or with ``power="³"`` after a volume; empty if it is unknown."""
+def unit_suffix(unit: str | None, power: str = "") -> str:
+    """Return the text after a length with a unit, such as ``" mm"``, or after a volume with the power ``"³"``.
+
+    It is empty if the unit is unknown.
+    """
     return "" if unit is None else f" {unit}{power}"
 
 
-def place(coordinates: Iterable[float]) -> str:
-    """Write the coordinates of a place in one line."""
+def point_in_words(coordinates: Iterable[float]) -> str:
+    """Return the coordinates of a point as text, such as ``"(1, 2.5, 0)"``."""
     return f"({', '.join(f'{x:.4g}' for x in coordinates)})"
 
 
 def solid_of(arguments: Namespace, path: str) -> Any:
-    """Read a file and complete its shape to a solid, as the options say; print important notes on standard error."""
+    """Read a shape and complete it to a solid, as the options say, and print important notes on standard error."""
     with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
         solid = completed(read_shape(arguments, path), *method_of(arguments), progress)
     say_important(arguments, solid.diagnostics, path)
@@ -114,7 +118,7 @@ def solid_of(arguments: Namespace, path: str) -> Any:
 
 
 def placement(arguments: Namespace, path: str) -> Floats | None:
-    """Return the (4, 4) matrix that applies ``--units``, then ``--transform``; None if neither is given."""
+    """Return the (4, 4) matrix that applies first ``--units``, then ``--transform``; None if neither is given."""
     if arguments.units is None and arguments.transform is None:
         return None
     matrix = np.eye(4)
@@ -126,16 +130,19 @@ def placement(arguments: Namespace, path: str) -> Floats | None:
 
 
 def unit_scale(arguments: Namespace, path: str) -> float:
-    """Return the factor for ``--units``; 1 if neither the option nor the file names the unit of the file."""
-    assumed, _, wanted = arguments.units.rpartition(":")
+    """Return the factor from the unit of a file to that of ``--units``.
+
+    It is 1 if neither the option nor the file names the unit of the file, with a message on standard error.
+    """
+    assumed, _, target = arguments.units.rpartition(":")
     if not assumed and unit_of(path) is None and not is_quiet(arguments):
         cause = f"{printable(path)} does not say its units"
-        say(f"signedheat: {cause}: taken as {wanted} (else --units inch:{wanted})")
+        say(f"signedheat: {cause}: taken as {target} (else --units inch:{target})")
     return scale_to(path, arguments.units)
 
 
 def matrix_of(words: list[str]) -> Floats:
-    """Return the (4, 4) matrix of 16 or 12 numbers, row by row, or of a text file that holds them."""
+    """Return the (4, 4) matrix of 16 or 12 numbers, row by row, given as words or in a text file named by one word."""
     if len(words) == 1:
         words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
     try:
@@ -156,7 +163,10 @@ def matrix_of(words: list[str]) -> Floats:
 def grid_for(
     shape: Any, arguments: Namespace, reach: float | None = None, image: sh.io.LabelImage | None = None
 ) -> sh.Grid:
-    """Make the grid of the options; by default the grid of the image, or one around the shape with room for offsets."""
+    """Make the grid that the options describe, by default that of the image, or one around the shape.
+
+    If the distance is needed up to `reach` from the shape, as for offsets, the default has room for that.
+    """
     spacing = arguments.spacing
     if spacing is not None and len(spacing) == 1:
         spacing = spacing[0]
@@ -170,7 +180,7 @@ def grid_for(
 
 
 def constraint_of(word: str) -> Constraint:
-    """Return a constraint from its name on the command line.
+    """Return the constraint with a name of the command line.
 
     Examples
     --------
@@ -191,10 +201,13 @@ def constraint_of(word: str) -> Constraint:
     return named[word]
 
 
-def measured(
+def shape_and_field(
     arguments: Namespace, image: sh.io.LabelImage | None = None, reach: float | None = None
 ) -> tuple[Any, sh.Field[sh.Grid]]:
-    """Return the shape of a command, from a file or an image, and the distance to it, with room for offsets."""
+    """Return the shape of a command, from a file or an image, and the distance to it on a grid.
+
+    The grid has room for offsets up to `reach`.
+    """
     with prefix_errors(arguments.shape):
         if image is not None:
             shape: Any = image.surface(arguments.label)
@@ -204,7 +217,7 @@ def measured(
 
 
 def method_of(arguments: Namespace) -> tuple[Completion, Heat]:
-    """Return the options of a command for completing shapes, and for the method."""
+    """Return the options of a command about completing shapes, and those about the method."""
     names = ("lids", "nested", "as_oriented", "keep_overlaps")
     completing: Completing = "none" if arguments.unsigned else "lids"
     completion = Completion(completing, **{name: getattr(arguments, name) for name in names})
@@ -216,7 +229,7 @@ def compute(shape: Any, domain: sh.Grid, arguments: Namespace) -> sh.Field[sh.Gr
 @overload
 def compute(shape: Any, domain: sh.TetMesh, arguments: Namespace) -> sh.Field[sh.TetMesh]: ...
 def compute(shape: Any, domain: sh.Grid | sh.TetMesh, arguments: Namespace) -> sh.Field[Any]:
-    """Return the distance to a shape in space or to lines in the plane; print important notes on standard error."""
+    """Return the distance to a shape in space or to lines in the plane, and print important notes on standard error."""
     where: Any = (
         nullcontext(arguments.scheduler) if arguments.workers is None else ThreadPoolExecutor(arguments.workers)
     )
@@ -233,8 +246,8 @@ def say_important(arguments: Namespace, diagnostics: Diagnostics, path: str | No
         say(printable(f"signedheat: {note}" if path is None else f"signedheat: {path}: {note}"))
 
 
-def hint(field: sh.Field[sh.Grid]) -> str:
-    """Return another line of output if faces may have been given twice, or else an empty text."""
+def hint_of_doubled_faces(field: sh.Field[sh.Grid]) -> str:
+    """Return a further line of output if most faces seem to be given twice, or else an empty text."""
     note = field.diagnostics.note(SampledSource)
     cancelled = note.area_cancelled if note else 0.0
     if cancelled < CANCELLED_AREA:
@@ -246,11 +259,11 @@ def hint(field: sh.Field[sh.Grid]) -> str:
 
 
 def range_in_words(summary: dict[str, Any], unit: str | None) -> str:
-    """Write the least and the greatest value of a field, taken from the figures of `describe`."""
-    return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{named(unit)}"
+    """Return a text with the least and the greatest value of a field, which `describe` summarized."""
+    return f"φ from {summary['minimum']:.4g} to {summary['maximum']:.4g}{unit_suffix(unit)}"
 
 
-def on_tets(arguments: Namespace) -> tuple[Any, sh.Field[sh.TetMesh]]:
+def shape_and_field_on_tets(arguments: Namespace) -> tuple[Any, sh.Field[sh.TetMesh]]:
     """Return the shape of a command, and the distance to it on tets from a file or around the shape."""
     shape, mesh = read_shape(arguments, arguments.shape), sh.read(arguments.tets) if arguments.tets else None
     if mesh is not None and not isinstance(mesh, sh.TetMesh):
@@ -273,7 +286,10 @@ def on_tets(arguments: Namespace) -> tuple[Any, sh.Field[sh.TetMesh]]:
 
 
 def field_or_image(path: str) -> Any:
-    """Return the field in a file; the image in it, of labels or with turned axes; None if the file holds neither."""
+    """Read the field or the image in a file; return None if the file holds neither.
+
+    Images are those of labels, and values along axes that are not x, y, z.
+    """
     ending = extension(path)
     alone = ending == ".npy" and not Path(path).with_suffix(".json").is_file()
     if ending in NIFTI or alone:
@@ -293,7 +309,7 @@ def field_or_image(path: str) -> Any:
 
 
 def image_of(arguments: Namespace) -> sh.io.LabelImage | None:
-    """Return the image of labels of a command, placed as its options say, if there is one."""
+    """Read the image of labels of a command, scaled and transformed as the options say; None if it is no image."""
     if extension(arguments.shape) not in IMAGES:
         if arguments.label is not None:
             raise SourceError("only images have labels", element="--label", remedy="leave it out", path=arguments.shape)
@@ -301,13 +317,13 @@ def image_of(arguments: Namespace) -> sh.io.LabelImage | None:
     image, matrix = sh.io.read_labels(arguments.shape), placement(arguments, arguments.shape)
     if matrix is None:
         return image
-    turn = matrix[:3, :3]
+    linear, shift = matrix[:3, :3], matrix[:3, 3]
     with prefix_errors(arguments.shape):
-        return sh.io.LabelImage(image.labels, turn @ image.axes, turn @ image.origin + matrix[:3, 3], image.space)
+        return sh.io.LabelImage(image.labels, linear @ image.axes, linear @ image.origin + shift, image.space)
 
 
 def labels_of(image: sh.io.LabelImage) -> list[int] | None:
-    """Return the labels, if these are few whole numbers; otherwise the image holds a field."""
+    """Return the distinct labels of an image, or None if its values are not few whole numbers, as those of fields."""
     values = image.labels.astype(np.int8) if image.labels.dtype == bool else image.labels
     distinct = np.unique(values[np.isfinite(values)])
     if len(distinct) > MOST_LABELS or (distinct != np.round(distinct)).any():
@@ -316,26 +332,29 @@ def labels_of(image: sh.io.LabelImage) -> list[int] | None:
 
 
 def field_of(image: sh.io.LabelImage) -> sh.Field[sh.Grid]:
-    """Return the values of an image as a field along its own axes."""
+    """Return the values of an image as a field on its own grid, along the axes of the image."""
     return sh.Field(image.grid, image.labels.astype(np.float64))
 
 
-def thing_of(image: sh.io.LabelImage) -> sh.Field[sh.Grid] | sh.PolygonMesh:
-    """Return what an image shows, along its own axes: a field, or the boundary of all voxels with a label."""
+def field_or_boundary(image: sh.io.LabelImage) -> sh.Field[sh.Grid] | sh.PolygonMesh:
+    """Return an image as a field or, if it has labels, the boundary of all voxels with labels other than 0.
+
+    Both are in coordinates along the axes of the image.
+    """
     if labels_of(image) is None:
         return field_of(image)
     return sh.DigitalSurface(image.labels != 0, image.spacing).squares
 
 
-def place_of(image: sh.io.LabelImage | None) -> dict[str, Any]:
-    """Describe the place of an image, for ``--json``."""
+def position_figures(image: sh.io.LabelImage | None) -> dict[str, Any]:
+    """Return the axes, origin and space of an image, for ``--json``; an empty dictionary without an image."""
     if image is None:
         return {}
     return {"image": {"axes": image.axes.tolist(), "origin": image.origin.tolist(), "space": image.space}}
 
 
 def ensure_surface_writable(path: str, planar: bool = False) -> None:
-    """Check before computing that a surface, or polylines in the plane, can be written."""
+    """Raise an error if a surface, or polylines in the plane, cannot be written, before a long computation."""
     if planar:
         sh.io.ensure_writable(path, sh.io.POLYLINE_FORMATS, "lines in the plane")
     else:
@@ -345,9 +364,10 @@ def ensure_surface_writable(path: str, planar: bool = False) -> None:
 def save_level(
     what: Any, path: str, image: sh.io.LabelImage | None = None, field: sh.Field[sh.Grid] | None = None
 ) -> None:
-    """Write a surface, or polylines in the plane; a surface from an image gets the image's place.
+    """Write a level set, which is a surface in space or polylines in the plane.
 
-    Where the field has a confidence, and the format has room for it, that is written at each vertex.
+    A surface from an image is mapped to the world. If its field has a confidence and the format supports it, the
+    confidence at each vertex is written, too.
     """
     if isinstance(what, list):
         return sh.io.write_polylines(what, path)
@@ -358,8 +378,8 @@ def save_level(
         sh.save(placed, path)
 
 
-def counts(what: Any) -> dict[str, Any]:
-    """Return key figures of a surface, or of polylines in the plane."""
+def sizes_of(what: Any) -> dict[str, Any]:
+    """Return numbers of vertices and faces of a surface, or the number and length of polylines in the plane."""
     if isinstance(what, list):
         closed = sum(line.closed for line in what)
         return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
@@ -367,12 +387,12 @@ def counts(what: Any) -> dict[str, Any]:
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:
-    """Return the given name for one distance, or names with the distances in them for several."""
+    """Return a name of a file for each distance: the given one for a single distance, or with the distance in it."""
     return [output] if len(distances) == 1 else [named_after(output, number) for number in distinct_names(distances)]
 
 
 def named_after(output: str, part: str) -> str:
-    """Return the name of an output with a part of its own before its extension."""
+    """Return the name of an output with an underscore and a further part before its extension."""
     path = Path(output)
     if not path.name:  # what does not name a file is refused later
         return output

@@ -24,17 +24,20 @@ from .terminal import say, write_out
 Summary: TypeAlias = tuple[dict[str, Any], str]
 """The result of a command: a dictionary for ``--json``, and text."""
 Run: TypeAlias = Callable[[Namespace], Summary]
+"""Function that runs a command."""
 Check: TypeAlias = Callable[[Namespace], None]
+"""Function that exits with an error if arguments of a command contradict each other, and may complete them."""
 
 PLANAR = (".csv", ".dxf", ".geojson", ".svg")
 """Extensions of files with polylines in the plane."""
 IMAGES = (".npy", ".nrrd", ".vti", ".nii", ".nii.gz")
 """Extensions of files that may hold images of labels."""
 SURFACES = "surface: .stl .obj .ply .off .vtp"
+"""Help for an output that is a surface."""
 LENGTH_UNITS = ("micron", "mm", "millimeter", "cm", "centimeter", "inch", "foot", "m", "meter")
-"""Units of length."""
+"""Names of units of length."""
 CONSTRAINTS = ("free", "zero-set", "hard", "each-component", "soft", "soft:WEIGHT")
-"""Names of the constraints except levels, as they are given and listed in errors."""
+"""Names of the constraints except ``levels:V,V,…``, as errors list them."""
 
 
 COMMANDS_OF_OTHERS = {
@@ -68,14 +71,14 @@ COMMANDS_OF_OTHERS = {
     "thicken": "morph",
     "voxelize": "volume",
 }
-"""Commands of ours, by the names that other programs have for them."""
+"""Commands to suggest, by names that other programs have for them."""
 
 
 class Parser(argparse.ArgumentParser):
     """An argument parser with one-line errors."""
 
     def error(self, message: str) -> NoReturn:
-        """Print an error in one line, and exit with status 2."""
+        """Print an error in one line, with a suggestion for commands of other programs, and exit with status 2."""
         unknown = re.search(r"COMMAND: invalid choice: '([^']*)'", message)
         if unknown and unknown[1] in COMMANDS_OF_OTHERS:
             message = f"there is no command '{unknown[1]}': use {COMMANDS_OF_OTHERS[unknown[1]]}"
@@ -96,7 +99,7 @@ class Option:
 
     @property
     def attribute(self) -> str:
-        """The name of the value of the option among the arguments."""
+        """The name of the attribute that has the value of the option in the parsed arguments."""
         return str(self.settings.get("dest", self.names[-1].lstrip("-").replace("-", "_")))
 
     @property
@@ -115,24 +118,24 @@ class Group:
 
 @dataclass(frozen=True)
 class Command:
-    """A command, as `command` declares it, and the function that runs it."""
+    """A command, as the decorator `command` declares it."""
 
     name: str
     run: Run
-    help: str
-    description: str
-    options: tuple[Option | Group, ...] = ()
+    help: str  # one line in the list of commands
+    description: str  # in the help of the command
+    options: tuple[Option | Group, ...] = ()  # its own, in the order of the help
     check: Check | None = None
-    usage: str | None = None
+    usage: str | None = None  # what follows the name of the command in the first line of its help
 
     @property
     def declared(self) -> dict[str, Option]:
-        """All of its options by name."""
+        """All options of the command, with those that all commands have, by their last name."""
         groups = (entry.options if isinstance(entry, Group) else (entry,) for entry in (*COMMON, *self.options))
         return {option.names[-1]: option for options in groups for option in options}
 
     def add_to(self, commands: Any) -> None:
-        """Add the command to the commands of a parser."""
+        """Add the command to the subparsers of an argparse parser."""
         parser = commands.add_parser(self.name, help=self.help, description=self.description)
         if self.usage is not None:
             parser.usage = f"%(prog)s {self.usage}"
@@ -151,18 +154,21 @@ def command(
     check: Check | None = None,
     usage: str | None = None,
 ) -> Callable[[Run], Command]:
-    """Decorate the function that runs a command, and so declare the command.
+    """Return a decorator that makes a command of the function that runs it.
 
     Parameters
     ----------
-    name, help, description : str
-        Texts of the help.
+    name : str
+        The name of the command.
+    help, description : str
+        Its line in the list of commands, and the text in its own help.
     *options : Option or Group
-        In the order of the help, after the options that all commands have.
+        Its options in the order of the help, after those that all commands have.
     check : callable, optional
-        Exits with status 2 if arguments contradict each other in ways that `refuse_contradictions` does not know.
+        A function that exits with status 2 if arguments contradict each other in ways that `refuse_contradictions`
+        does not know.
     usage : str, optional
-        Text after the name of the command in the first line of its help.
+        What follows the name of the command in the first line of its help.
     """
     return lambda run: Command(name, run, help, description, options, check, usage)
 
@@ -182,7 +188,7 @@ def parser_of(commands: Iterable[Command]) -> Parser:
 
 
 def without_exponents(words: Iterable[str]) -> list[str]:
-    """Write negative numbers such as -1e-3 in plain digits, since argparse takes them for options.
+    """Return words with negative numbers such as -1e-3 in plain digits, since argparse mistakes these for options.
 
     Examples
     --------
@@ -225,18 +231,18 @@ def refuse_unused_formats(arguments: Namespace) -> None:
 
 
 def _names(value: Any) -> list[str]:
-    """Return the valid names of files in the value of an argument."""
+    """Return those strings in the value of an argument, a string or a list, that can be names of files."""
     values = value if isinstance(value, list) else [value]
     return [name for name in values if isinstance(name, str) and "\0" not in name]
 
 
 def output(help: str, metavar: str = "OUT") -> Option:
-    """Return the option that names the output."""
+    """Return the option ``-o`` that names the output, with its help."""
     return option("-o", "--output", required=True, metavar=metavar, help=help)
 
 
 def format_option(standard: str) -> Option:
-    """Return the option for the format of standard output, with its default."""
+    """Return the option ``--format`` of standard output; `standard` is its default."""
     return option(
         "--format", default=standard, metavar="EXT", help=f"format of standard output (-o -), {standard} by default"
     )
@@ -248,7 +254,7 @@ def is_quiet(arguments: Namespace) -> bool:
 
 
 def finite(word: str) -> float:
-    """Parse a finite number."""
+    """Parse a finite number, for argparse."""
     try:
         value = float(word)
     except ValueError:
@@ -266,7 +272,7 @@ def ending(word: str) -> str:
 
 
 def bounded(fault: str, is_within: Callable[[float], bool]) -> Callable[[str], float]:
-    """Return a parser of finite numbers within bounds; its error for other numbers names the fault."""
+    """Return a function that parses finite numbers for which `is_within` holds. Errors for others name the fault."""
 
     def parse(word: str) -> float:
         value = finite(word)
@@ -283,7 +289,7 @@ fraction = bounded("less than 0 or more than 1", lambda value: 0 <= value <= 1)
 
 
 def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
-    """Return a parser of whole numbers from `least` to `most`."""
+    """Return a function that parses whole numbers from `least` to `most`."""
     upper = "on" if most is None else f"to {most}"
 
     def parse(word: str) -> int:
@@ -296,7 +302,7 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
 
 
 def units(word: str) -> str:
-    """Check that a word is a unit, or two units separated by a colon."""
+    """Return a word if it is a unit, or two units separated by a colon; otherwise raise an error for argparse."""
     for unit in word.split(":", 1):
         if unit not in LENGTH_UNITS:
             raise argparse.ArgumentTypeError(f"'{unit}' is not one of {', '.join(LENGTH_UNITS)}")
@@ -304,7 +310,7 @@ def units(word: str) -> str:
 
 
 def constraint(word: str, known: tuple[str, ...] = CONSTRAINTS) -> str:
-    """Check that a word is one of the known constraints; the weight of a soft one must be positive."""
+    """Return a word if it names one of the known constraints, or a soft one with a positive weight; else raise."""
     name, _, weight = word.partition(":")
     if name == "soft":
         if weight:
@@ -315,7 +321,7 @@ def constraint(word: str, known: tuple[str, ...] = CONSTRAINTS) -> str:
 
 
 def surface_constraint(word: str) -> str:
-    """Check the name of a constraint on surfaces, which may also have levels."""
+    """Return a word if it names a constraint on curves, which may also be ``levels:V,V,…``; else raise an error."""
     name, _, values = word.partition(":")
     if name == "levels":
         for value in values.split(","):
@@ -325,7 +331,7 @@ def surface_constraint(word: str) -> str:
 
 
 def shape_option(planar: str = "") -> Option:
-    """Return the argument for the shape of a command; `planar` lists formats of drawings in the plane."""
+    """Return the argument for the shape of a command; `planar` is more help about drawings in the plane."""
     return option(
         "shape", metavar="SHAPE", help=f"surface or oriented points: .stl .obj .ply .off .vtp .glb .xyz .pc{planar}"
     )
@@ -486,13 +492,14 @@ COMMON = (
     ),
 )
 """Options of all commands."""
-SHARED = (LABEL, SLICES, *(one for each in (PLACE, GRID, COMPLETION_STEPS, METHOD, TILES) for one in each.options))
+SHARED = (LABEL, SLICES, *(entry for part in (PLACE, GRID, COMPLETION_STEPS, METHOD, TILES) for entry in part.options))
+"""Options that functions for several commands read."""
 ABSENT: Mapping[str, Any] = {"operation": "", "shape": "", **{option.attribute: option.default for option in SHARED}}
-"""Defaults of options that a command lacks, so that all commands can share the functions that read them."""
-
+"""Values of these options for commands that lack them, so that all commands can share these functions."""
 DRAWING, THICKEN = "a drawing", "thicken"
+"""Names, in the tables below, of an input that is a drawing in the plane and of the operation of `morph`."""
 WITHOUT_COMPLETION = ("--plain", "--constraint each-component", "--constraint levels")
-"""Options with which the method takes a shape or curves as they are."""
+"""Options with which shapes or curves are not completed before the method runs."""
 ONLY_WITH = {
     "--tiles": "--band",
     **dict.fromkeys(("--workers", "--scheduler"), "--tiles"),
@@ -500,7 +507,7 @@ ONLY_WITH = {
     "--surface": "--offset",
     "--up": "--preview",
 }
-"""Options that have an effect only with another one, in commands that have both."""
+"""The option that another one needs to have an effect, in commands that have both."""
 EXCLUDED = {
     "--spacing": ("--resolution",),
     "--origin": ("--resolution", "--padding"),
@@ -519,16 +526,20 @@ EXCLUDED = {
         THICKEN,
     ),
 }
-"""Options that contradict others, which may be named with the beginning of a value, as for `is_given`."""
+"""Options that contradict each option, named as for `is_given`."""
 WITHOUT_SOLIDS = {
     **dict.fromkeys(("--band", "--lids", "--nested", "--keep-overlaps"), (*WITHOUT_COMPLETION, DRAWING, THICKEN)),
     **dict.fromkeys(("--as-oriented", "--plain", "--constraint", "--diffusion"), (THICKEN,)),
 }
-"""Options about solids, and the options and inputs with which no solid is made."""
+"""Options and inputs, named as for `is_given`, with which no solid is made, for each option about solids."""
 
 
 def is_given(arguments: Namespace, named: str) -> bool:
-    """Whether ``--option`` or ``--option BEGINNING-OF-VALUE`` is given; other names are of operations, or `DRAWING`."""
+    """Whether an option, an operation or an input is among the arguments.
+
+    It is named like ``--option``, like ``--option value`` with the beginning of its value, like an operation of
+    `morph`, or `DRAWING` for an input that is a drawing.
+    """
     if not named.startswith("-"):
         return named in (arguments.operation, DRAWING if is_planar(arguments.shape or "") else None)
     name, _, beginning = named.partition(" ")
@@ -538,7 +549,7 @@ def is_given(arguments: Namespace, named: str) -> bool:
 
 
 def refuse_together(arguments: Namespace, name: str, others: Iterable[str]) -> None:
-    """Exit with an error if an option is given together with one of some others."""
+    """Exit with an error if an option is given together with one of others, named as for `is_given`."""
     for other in others:
         if is_given(arguments, name) and is_given(arguments, other):
             arguments.parser.error(f"{name} and {other} do not go together: give one of them")

@@ -1,4 +1,4 @@
-"""Contents and defects of a file, and the memory that a grid around it takes, for `info`."""
+"""Reports of the command `info`: contents and defects of a file, and the memory of grids around it."""
 
 from __future__ import annotations
 
@@ -35,16 +35,17 @@ from .operands import describe, field_or_image, labels_of
 from .options import Summary, is_planar
 
 POINT_KINDS = {VERTEX: "vertex", EDGE: "edge", FACE: "face"}
+"""Words for what a point of a curve lies on."""
 OUTPUTS = "filled", "whole", "wall"
-"""Endings of the names that commands for repair write to: holes closed, made a solid, sheets thickened."""
+"""Endings of the names of repaired files: with closed holes, made a solid, sheets thickened."""
 SURFACE_FORMATS = {".stl", ".obj", ".ply", ".off", ".vtp"}
-"""Formats that these commands write; other files are repaired into the first."""
+"""Formats of repaired files. For files in other formats, the suggested output is ``.stl``."""
 WHOLE_AREA = 0.9999
-"""A share of the area above this is all of it: the rest is rounding error."""
+"""Fraction of the area above which it counts as all of it, since the rest may be rounding error."""
 
 
 def report(file: str, arguments: Namespace) -> Summary:
-    """Inspect a shape, a field or an image."""
+    """Return what `info` reports about a file with a shape, a field or an image: figures for JSON, and text."""
     field = field_or_image(file)
     if arguments.curves and (field is not None or is_planar(file)):
         raise SourceError("curves lie on surfaces, and this file holds none", element="--curves", path=file)
@@ -59,12 +60,12 @@ def report(file: str, arguments: Namespace) -> Summary:
         return lines_report(file)
     held = read(file)
     shape = sh.as_shape(held)
-    counts, found, measured = inspected(held)
-    told = verdict_of_solid(held) if isinstance(held, sh.Solid) else verdict(counts, found)
-    summary = {"verdict": told, "file": file, **shape_figures(held, counts, found, measured)}
+    counts, oriented, measured = inspected(held)
+    words = verdict_of_solid(held) if isinstance(held, sh.Solid) else verdict(counts, oriented)
+    summary = {"verdict": words, "file": file, **shape_figures(held, counts, oriented, measured)}
     defects = list[Defect]()
-    if isinstance(counts, SurfaceReport) and found is not None:
-        defects = defects_of(counts, found, file)
+    if isinstance(counts, SurfaceReport) and oriented is not None:
+        defects = defects_of(counts, oriented, file)
     if (unit := unit_of(file)) is not None:
         summary["units"] = unit
     if extension(file) == ".obj":
@@ -74,8 +75,8 @@ def report(file: str, arguments: Namespace) -> Summary:
         summary["without_small_parts"] = advice = without_small_parts(counts, file)
         rows["small_parts"] = f"{counts.small_parts}, left out by {printable(advice)}"
     summary |= {"defects": [asdict(defect) for defect in defects], "remedy": remedy_of(defects)}
-    if found is not None:
-        rows["orientation"] = orientation_text(found)
+    if oriented is not None:
+        rows["orientation"] = orientation_text(oriented)
     if measured is not None:
         rows |= _width_rows(measured)
     summary["memory_bytes"] = sizes = {str(n): _memory(shape, n) for n in arguments.resolution}
@@ -102,7 +103,7 @@ def report(file: str, arguments: Namespace) -> Summary:
 
 
 def lines_report(file: str) -> Summary:
-    """Inspect polylines in the plane."""
+    """Return what `info` reports about a file with polylines in the plane."""
     lines = sh.io.read_polylines(file)
     bounds = bounds_around(lines)
     summary = {
@@ -119,7 +120,7 @@ def lines_report(file: str) -> Summary:
 
 
 def image_report(file: str, image: sh.io.LabelImage) -> dict[str, Any]:
-    """Report the place of an image, and its labels or the range of its values."""
+    """Return figures of an image: its position in the world, and its labels or the range of its values."""
     values, labels = image.labels, labels_of(image)
     figures: dict[str, Any] = {
         "file": file,
@@ -138,15 +139,15 @@ def image_report(file: str, image: sh.io.LabelImage) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Defect:
-    """A kind of defect, how often there is one, what it is in words, and the command that mends it."""
+    """Defects of one kind in a surface."""
 
-    defect: str
+    defect: str  # the kind, such as "holes"
     count: int
-    text: str
-    remedy: str
+    text: str  # number and kind in words
+    remedy: str  # the command that mends them
 
 
-def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Defect]:
+def defects_of(counts: SurfaceReport, oriented: Orientation, file: str) -> list[Defect]:
     """List the defects of a surface with the command for each.
 
     Examples
@@ -158,27 +159,27 @@ def defects_of(counts: SurfaceReport, found: Orientation, file: str) -> list[Def
     """
     name, filled, whole, wall = outputs_of(counts, file)
     repair = f"signedheat watertight {name} -o {whole}"
-    borders = 0 if found.undecided_area > WHOLE_AREA else counts.borders  # the outlines of sheets are no holes
+    borders = 0 if oriented.undecided_area > WHOLE_AREA else counts.borders  # the outlines of sheets are no holes
     kinds = (
         ("holes", borders, "hole", "to complete", f"signedheat fill {name} -o {filled}"),
-        ("turned_faces", found.turned_faces, "face", "to flip", repair),
-        ("duplicate_faces", found.merged_faces, "duplicate face", "to merge", repair),
-        ("hidden_parts", found.nested_bodies, "part", "hidden in others, to leave out", repair),
+        ("turned_faces", oriented.turned_faces, "face", "to flip", repair),
+        ("duplicate_faces", oriented.merged_faces, "duplicate face", "to merge", repair),
+        ("hidden_parts", oriented.nested_bodies, "part", "hidden in others, to leave out", repair),
         ("nonmanifold_edges", counts.nonmanifold_edges, "edge", "of three or more faces", repair),
     )
     defects = [
-        Defect(kind, number, f"{_count(number, one)} {what}", remedy) for kind, number, one, what, remedy in kinds
+        Defect(kind, number, f"{_count(number, noun)} {rest}", remedy) for kind, number, noun, rest, remedy in kinds
     ]
-    if found.undecided_area > 1 - WHOLE_AREA:
-        text = f"{percent(found.undecided_area)} of the area bounds nothing"
+    if oriented.undecided_area > 1 - WHOLE_AREA:
+        text = f"{percent(oriented.undecided_area)} of the area bounds nothing"
         size = 0.01 * float(np.linalg.norm(np.subtract(counts.upper, counts.lower)))
         thicken = f"signedheat morph thicken {name} {size:.2g} -o {wall}"
-        defects.append(Defect("sheets", found.undecided_parts, text, thicken))
+        defects.append(Defect("sheets", oriented.undecided_parts, text, thicken))
     return [defect for defect in defects if defect.count]
 
 
 def outputs_of(counts: SurfaceReport, file: str) -> list[str]:
-    """Return a file and the files to which commands write it filled, watertight and thickened, quoted for a shell."""
+    """Return the names of a file and of its repaired versions with the endings `OUTPUTS`, quoted for a shell."""
     stem, ending = os.path.splitext(file)
     ending = ending.lower() if ending.lower() in SURFACE_FORMATS else ".stl"
     if ending == ".stl" and counts.nonmanifold_edges:
@@ -201,14 +202,14 @@ def without_small_parts(counts: SurfaceReport, file: str) -> str:
 
 
 def remedy_of(defects: Sequence[Defect]) -> str | None:
-    """Return one command that mends all defects: the only one, or that which mends all but sheets."""
+    """Return a command that mends all defects, except sheets if there are others; None if there are no defects."""
     remedies = dict.fromkeys(defect.remedy for defect in defects)
     repairs = [remedy for remedy in remedies if remedy.startswith("signedheat watertight")]
     return next(iter([*repairs, *remedies]), None)
 
 
-def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation | None) -> str:
-    """Say in one line whether a shape is whole, and if not, what completion will mend.
+def verdict(counts: SurfaceReport | CloudReport | TetReport, oriented: Orientation | None) -> str:
+    """Return a line that says whether a shape is whole, and if not, what its defects are.
 
     Examples
     --------
@@ -224,20 +225,20 @@ def verdict(counts: SurfaceReport | CloudReport | TetReport, found: Orientation 
             return "points with normals: every command takes them for the solid that they bound"
         return "points without normals: these are found first; thin sheets of noisy points may lose their sides"
     if isinstance(counts, TetReport):
-        turned = counts.inside_out_tets + counts.flat_tets
-        return f"tets, {turned} of them inside out or flat" if turned else "tets, all of them sound"
-    if found is None:
+        n_bad = counts.inside_out_tets + counts.flat_tets
+        return f"tets, {n_bad} of them inside out or flat" if n_bad else "tets, all of them sound"
+    if oriented is None:
         return "voxels: closed and oriented"
-    if found.undecided_area > WHOLE_AREA:
+    if oriented.undecided_area > WHOLE_AREA:
         return "open sheets that bound nothing: `signedheat morph thicken` makes walls of them"
-    said = [defect.text for defect in defects_of(counts, found, "")]
-    if not said:
+    texts = [defect.text for defect in defects_of(counts, oriented, "")]
+    if not texts:
         return "whole: closed and oriented; distance to it is exact"
-    return f"broken: {', '.join(said)}; every command takes it as it is"
+    return f"broken: {', '.join(texts)}; every command takes it as it is"
 
 
 def verdict_of_solid(solid: sh.Solid) -> str:
-    """Say in one line that a solid is complete, and how much of it is completion or sheets.
+    """Return a line that says that a solid is complete, and how much of it is completion or sheets.
 
     Examples
     --------
@@ -253,8 +254,8 @@ def verdict_of_solid(solid: sh.Solid) -> str:
     return f"a solid: {', '.join(said)}; distance to it is exact"
 
 
-def orientation_text(found: Orientation) -> str:
-    """Say in one line which way a mesh faces.
+def orientation_text(oriented: Orientation) -> str:
+    """Return a line that says which way the faces of a mesh point, and what its parts are.
 
     Examples
     --------
@@ -262,44 +263,47 @@ def orientation_text(found: Orientation) -> str:
     >>> orientation_text(inspected(samples.with_flipped_faces(samples.sphere(2), 0.1))[1])
     '1 part, closed; faces disagree at 89 edges: 33 faces to flip (10.2 % of the area)'
     """
-    closed = "closed" if found.closed_parts == found.n_parts else f"{found.closed_parts} closed"
-    said = [f"{_count(found.n_parts, 'part')}, {closed}"]
-    if found.inconsistent_edges:
-        edges, faces = _count(found.inconsistent_edges, "edge"), _count(found.turned_faces, "face")
-        said.append(f"faces disagree at {edges}: {faces} to flip ({percent(found.turned_area)} of the area)")
-    elif found.turned_parts:
-        which = "all" if found.turned_area > WHOLE_AREA else f"{_count(found.turned_parts, 'part')}"
-        said.append(f"{which} facing inwards ({percent(found.turned_area)} of the area to flip)")
-    elif found.undecided_area < WHOLE_AREA:
-        said.append("facing outwards")
+    closed = "closed" if oriented.closed_parts == oriented.n_parts else f"{oriented.closed_parts} closed"
+    phrases = [f"{_count(oriented.n_parts, 'part')}, {closed}"]
+    if oriented.inconsistent_edges:
+        edges, faces = _count(oriented.inconsistent_edges, "edge"), _count(oriented.turned_faces, "face")
+        phrases.append(f"faces disagree at {edges}: {faces} to flip ({percent(oriented.turned_area)} of the area)")
+    elif oriented.turned_parts:
+        which = "all" if oriented.turned_area > WHOLE_AREA else f"{_count(oriented.turned_parts, 'part')}"
+        phrases.append(f"{which} facing inwards ({percent(oriented.turned_area)} of the area to flip)")
+    elif oriented.undecided_area < WHOLE_AREA:
+        phrases.append("facing outwards")
     kinds = (
-        (found.nonorientable_parts, "nonorientable part", "nonorientable parts"),
-        (found.nested_bodies, "body hidden in another", "bodies hidden in others"),
-        (found.cavities, "cavity", "cavities"),
+        (oriented.nonorientable_parts, "nonorientable part", "nonorientable parts"),
+        (oriented.nested_bodies, "body hidden in another", "bodies hidden in others"),
+        (oriented.cavities, "cavity", "cavities"),
     )
-    said += [f"{number} {one if number == 1 else many}" for number, one, many in kinds if number]
-    if found.merged_faces:
-        said.append(f"{_count(found.merged_faces, 'duplicate face')} to merge")
-    if found.undecided_parts:
-        sheets = _count(found.undecided_parts, "sheet")
-        said.append(f"{percent(found.undecided_area)} of the area in {sheets} without an inside")
-    return "; ".join(said)
+    phrases += [f"{number} {one if number == 1 else many}" for number, one, many in kinds if number]
+    if oriented.merged_faces:
+        phrases.append(f"{_count(oriented.merged_faces, 'duplicate face')} to merge")
+    if oriented.undecided_parts:
+        sheets = _count(oriented.undecided_parts, "sheet")
+        phrases.append(f"{percent(oriented.undecided_area)} of the area in {sheets} without an inside")
+    return "; ".join(phrases)
 
 
 def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str, Any]:
-    """Return figures of a curve or points: where the points lie, and of a curve its segments, length and open ends."""
-    places = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
-    kinds = np.bincount(places.kinds, minlength=3)
+    """Return figures of a curve or points on triangles, by name; `number` is its position in the file.
+
+    They say what the points lie on, and of a curve its segments, length and open ends.
+    """
+    points = locate_points(triangles, source.faces, source.barycentric, f"source {number}: point")
+    kinds = np.bincount(points.kinds, minlength=3)
     row: dict[str, Any] = {
         "kind": "points",
-        "n_points": len(places),
+        "n_points": len(points),
         "at_vertices": int(kinds[VERTEX]),
         "on_edges": int(kinds[EDGE]),
         "in_faces": int(kinds[FACE]),
     }
     if not isinstance(source, sh.Curve):
         return row
-    apart = gaps(triangles, places, source.closed)
+    apart = gaps(triangles, points, source.closed)
     parts = segments_of(source, triangles, number=number)
     degree = np.bincount(parts.ends.ravel(), minlength=len(parts.nodes))
     ends = [
@@ -322,7 +326,7 @@ def curve_report(triangles: IntrinsicMesh, source: Any, number: int) -> dict[str
 
 
 def curves_text(rows: Sequence[dict[str, Any]]) -> str:
-    """Write the rows as text, one line each."""
+    """Return the figures of curves, which `curve_report` returns, as text with a line for each."""
     lines = []
     for number, row in enumerate(rows):
         points = f"{row['at_vertices']} at vertices, {row['on_edges']} on edges, {row['in_faces']} in faces"
@@ -341,16 +345,17 @@ def curves_text(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _shortened(items: Sequence[Any]) -> str:
-    """Write the first few items of a list."""
+    """Return the first six items of a list as text."""
     return ", ".join(map(str, items[:6])) + (", …" if len(items) > 6 else "")
 
 
 def _count(number: int, name: str) -> str:
+    """Return a number and a noun, such as ``"1 edge"`` or ``"2 edges"``."""
     return f"{number} {name}" if number == 1 else f"{number} {name}s"
 
 
 def _width_rows(widths: Widths) -> dict[str, str]:
-    """Return rows of the table by name; walls and gaps are percentiles, the thinnest place is the minimum."""
+    """Return rows of the table by name, with the widths of walls and gaps and where the thinnest wall is."""
     rows = {}
     for name, low, typical in (
         ("thin walls (1 %)", widths.wall, widths.typical_wall),
@@ -367,7 +372,10 @@ def _width_rows(widths: Widths) -> dict[str, str]:
 
 
 def _least_spacing(shape: Any) -> float | None:
-    """Return the spacing of the finest grid around the shape that fits into free memory; None if there is none."""
+    """Return the spacing of the finest grid around a shape that fits into free memory.
+
+    It is None if the memory is unknown, the shape is a single point, or no grid fits.
+    """
     available = available_memory()
     if available is None or not (shape.bounds[1] > shape.bounds[0]).any():
         return None
@@ -377,13 +385,14 @@ def _least_spacing(shape: Any) -> float | None:
 
 
 def _memory(shape: Any, resolution: int) -> int | None:
-    """Estimate memory for a grid around the shape; None if the shape is a single place."""
+    """Return the estimated memory in bytes for a grid around a shape; None if the shape is a single point."""
     if not (shape.bounds[1] > shape.bounds[0]).any():
         return None
     return memory_estimate(sh.Grid.around(shape.bounds, resolution), BYTES_PER_DENSE_NODE, BYTES_AT_WORK)
 
 
 def _table(summary: dict[str, Any]) -> str:
+    """Return figures as text, with a line for each name and its value."""
     rows = []
     for key, value in summary.items():
         if isinstance(value, (list, tuple)):

@@ -1,4 +1,4 @@
-"""The command about the installation, `warmup`; and all commands, in the order of the help."""
+"""The command `warmup`, and the table of all commands, in the order of the help."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def warmup(arguments: Namespace) -> Summary:
 
 
 def _run_apart(name: str) -> None:
-    """Run a job in a process of its own: compiling occupies one processor of each process."""
+    """Run a job of `kernel_runs` in a process of its own, since compiling occupies only one processor of a process."""
     done = subprocess.run(command_for(f"{__name__}:run_job", name), stdin=subprocess.DEVNULL, capture_output=True)
     if done.returncode:
         lines = done.stderr.decode("utf-8", errors="replace").split("\n")
@@ -74,7 +74,7 @@ def _run_apart(name: str) -> None:
 
 
 def run_job(name: str) -> None:
-    """Run a job of `warmup` without announcements and warnings."""
+    """Run a job of `kernel_runs` without announcements and warnings, as the main function of a process of `warmup`."""
     Announcement.are_wanted = False
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the shapes are too small for warnings to mean anything

@@ -53,11 +53,11 @@ DISTANCES = {
     "shell": (2, 2),
     "thicken": (1, 2),
 }
-"""Operations of `morph`, which are functions of the package, with the least and the greatest number of distances."""
+"""Least and greatest number of distances of each operation of `morph`, a function of `signedheat.morphology`."""
 
 
 def check_volume(arguments: Namespace) -> None:
-    """Reject ``--resolution`` and ``--padding`` where ``--tets`` names a file."""
+    """Exit with an error if ``--resolution`` or ``--padding`` are given and ``--tets`` names a file."""
     if arguments.tets and (arguments.resolution, arguments.padding) != (None, None):
         arguments.parser.error("--resolution and --padding are for tets around the shape, and --tets names others")
 
@@ -89,7 +89,7 @@ def volume(arguments: Namespace) -> Summary:
         sh.io.ensure_field_writable(arguments.output, in_band=arguments.band is not None)
     else:
         image.ensure_writable(arguments.output)
-    shape, field = shapes.measured(arguments, image)
+    shape, field = shapes.shape_and_field(arguments, image)
     if image is None:
         field.save(arguments.output)
     else:
@@ -97,19 +97,24 @@ def volume(arguments: Namespace) -> Summary:
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape)
     unit = shapes.unit_in_use(arguments, arguments.shape)
-    summary = {"input": arguments.shape, "output": arguments.output, **shapes.describe(field), **shapes.place_of(image)}
+    summary = {
+        "input": arguments.shape,
+        "output": arguments.output,
+        **shapes.describe(field),
+        **shapes.position_figures(image),
+    }
     summary["units"] = unit
     nodes = " × ".join(map(str, field.domain.shape))
     within = "" if arguments.band is None else f" ({summary['nodes']:,} of them there)"
     text = f"{printable(arguments.output)}: {nodes} nodes{within}, {shapes.range_in_words(summary, unit)}"
-    return summary, text + shapes.hint(field)
+    return summary, text + shapes.hint_of_doubled_faces(field)
 
 
 def _on_tets(arguments: Namespace) -> Summary:
     """Write the distance to a shape on tets, for `volume`."""
     sh.io.ensure_writable(arguments.output, sh.io.TET_FIELD_FORMATS, "a field on tets")
     require("meshio", "fields on tets")
-    shape, field = shapes.on_tets(arguments)
+    shape, field = shapes.shape_and_field_on_tets(arguments)
     field.save(arguments.output)
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape)
@@ -120,7 +125,7 @@ def _on_tets(arguments: Namespace) -> Summary:
 
 
 def check_offset(arguments: Namespace) -> None:
-    """Reject distances beyond a band, and several surfaces on standard output."""
+    """Exit with an error for distances beyond a band, and for several surfaces on standard output."""
     if arguments.output == "-" and len(arguments.distances) > 1:
         arguments.parser.error("standard output takes one surface: name a file, or give one distance")
     reach = max(map(abs, arguments.distances))
@@ -153,7 +158,7 @@ def offset(arguments: Namespace) -> Summary:
     for path in outputs:
         shapes.ensure_surface_writable(path, planar)
     image = shapes.image_of(arguments)
-    shape, field = shapes.measured(arguments, image, max(map(abs, arguments.distances)))
+    shape, field = shapes.shape_and_field(arguments, image, max(map(abs, arguments.distances)))
     with shapes.prefix_errors(arguments.shape):
         surfaces = [field.offset(distance) for distance in arguments.distances]
     for what, path in zip(surfaces, outputs, strict=True):
@@ -161,14 +166,15 @@ def offset(arguments: Namespace) -> Summary:
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape, arguments.distances)
     written = [
-        {"distance": distance, "output": path, **shapes.counts(what)}
+        {"distance": distance, "output": path, **shapes.sizes_of(what)}
         for distance, path, what in zip(arguments.distances, outputs, surfaces, strict=True)
     ]
     unit = shapes.unit_in_use(arguments, arguments.shape)
-    kind = f"{{lines:line}} ({{closed}} closed), length {{length:.6g}}{shapes.named(unit)}"
+    kind = f"{{lines:line}} ({{closed}} closed), length {{length:.6g}}{shapes.unit_suffix(unit)}"
     kind = kind if planar else "closed surface, {faces} faces"
     text = "\n".join(
-        f"{w['output']}: at {w['distance']:+g}{shapes.named(unit)}, {Sentence().format(kind, **w)}" for w in written
+        f"{w['output']}: at {w['distance']:+g}{shapes.unit_suffix(unit)}, {Sentence().format(kind, **w)}"
+        for w in written
     )
     summary = {
         "units": unit,
@@ -176,20 +182,20 @@ def offset(arguments: Namespace) -> Summary:
         "lines" if planar else "surfaces": written,
         "field": shapes.describe(field),
     }
-    return summary | shapes.place_of(image), text + shapes.hint(field)
+    return summary | shapes.position_figures(image), text + shapes.hint_of_doubled_faces(field)
 
 
 def check_morph(arguments: Namespace) -> None:
-    """Reject a wrong number of distances, and options of other operations."""
+    """Exit with an error for a wrong number of distances, and for options of other operations."""
     if arguments.operation != "shell" and (arguments.keep_outside or arguments.drain is not None):
         arguments.parser.error("--keep-outside and --drain are for shells")
     if arguments.operation != "thicken" and (arguments.side != "both" or arguments.faces):
         arguments.parser.error("--side and --faces are for sheets: morph thicken")
     fewest, most = DISTANCES[arguments.operation]
     if not fewest <= len(arguments.distances) <= most:
-        wanted = str(fewest) if fewest == most else f"{fewest} or {most}"
-        given = f"{arguments.operation} takes {wanted}, not {len(arguments.distances)}"
-        arguments.parser.error(f"argument DISTANCE: {given}")
+        needed = str(fewest) if fewest == most else f"{fewest} or {most}"
+        cause = f"{arguments.operation} takes {needed}, not {len(arguments.distances)}"
+        arguments.parser.error(f"argument DISTANCE: {cause}")
 
 
 @command(
@@ -244,7 +250,7 @@ def morph(arguments: Namespace) -> Summary:
     elif arguments.preview:
         sh.view.save_scene(surface, arguments.preview)
     summary = {"input": arguments.shape, "operation": arguments.operation, "distances": arguments.distances}
-    summary |= {"output": arguments.output, **shapes.counts(surface)}
+    summary |= {"output": arguments.output, **shapes.sizes_of(surface)}
     summary |= {"field": shapes.describe(fields[0])} if fields else {}
     return summary, f"{printable(arguments.output)}: {arguments.operation}, closed surface of {surface.n_faces} faces"
 
@@ -289,7 +295,7 @@ COMBINED = {
 
 
 def check_combined(arguments: Namespace) -> None:
-    """Reject a single shape."""
+    """Exit with an error if there is only one shape."""
     if len(arguments.files) < 2:
         arguments.parser.error("two shapes or more are combined, not one")
 
@@ -301,14 +307,14 @@ def combined(combine: Callable[[sh.Solid, sh.Solid], sh.Solid], arguments: Names
     unit = shapes.unit_in_use(arguments, *arguments.files)
     result = reduce(combine, [shapes.solid_of(arguments, file) for file in arguments.files])
     result.save(path)
-    text = f"{printable(path)}: volume {result.volume:.6g}{shapes.named(unit, '³')}"
-    text += f", area {result.area:.6g}{shapes.named(unit, '²')}"
+    text = f"{printable(path)}: volume {result.volume:.6g}{shapes.unit_suffix(unit, '³')}"
+    text += f", area {result.area:.6g}{shapes.unit_suffix(unit, '²')}"
     figures = {"volume": result.volume, "area": result.area, "units": unit}
     return {"inputs": arguments.files, "output": path, **figures}, text
 
 
 def combining(name: str) -> Command:
-    """Declare the command of `COMBINED` with this name."""
+    """Return the command with a name of `COMBINED`."""
     combine, help = COMBINED[name]
     return command(
         name,
@@ -333,7 +339,7 @@ union, intersect, subtract = map(combining, COMBINED)
 
 
 def check_section(arguments: Namespace) -> None:
-    """Reject several sections on standard output."""
+    """Exit with an error for several sections on standard output."""
     if arguments.output == "-" and len(arguments.heights) > 1:
         arguments.parser.error("standard output takes one section: name a file, or give one height")
 
@@ -368,24 +374,25 @@ def section(arguments: Namespace) -> Summary:
     with shapes.prefix_errors(arguments.shape):
         origin = solid.bounds.mean(axis=0) if arguments.origin is None else arguments.origin
         sections = solid.section(origin, arguments.normal, heights=arguments.heights)
-        cut = [(path, found) for path, found in zip(outputs, sections, strict=True) if found.outlines or found.sheets]
+        cut = [(path, part) for path, part in zip(outputs, sections, strict=True) if part.outlines or part.sheets]
         if not cut:
             low, high = solid.bounds.tolist()
             raise sh.errors.OutsideError(
-                f"no plane meets the shape, which reaches from {shapes.place(low)} to {shapes.place(high)}",
+                f"no plane meets the shape, which reaches from {shapes.point_in_words(low)} "
+                f"to {shapes.point_in_words(high)}",
                 remedy="choose another origin, or other heights",
                 element="--origin",
             )
     unit = shapes.unit_in_use(arguments, arguments.shape)
-    for path, found in cut:
-        sh.io.write_polylines([*found.outlines, *found.sheets], path)
+    for path, part in cut:
+        sh.io.write_polylines([*part.outlines, *part.sheets], path)
     written = [
-        {"output": path, "outlines": len(found.outlines), "area": found.area, "lines_of_sheets": len(found.sheets)}
-        for path, found in cut
+        {"output": path, "outlines": len(part.outlines), "area": part.area, "lines_of_sheets": len(part.sheets)}
+        for path, part in cut
     ]
     text = "\n".join(
         f"{printable(str(w['output']))}: {counted(int(w['outlines']), 'outline')}, area {w['area']:.6g}"
-        f"{shapes.named(unit, '²')}"
+        f"{shapes.unit_suffix(unit, '²')}"
         for w in written
     )
     return {"input": arguments.shape, "units": unit, "sections": written}, text
@@ -415,7 +422,9 @@ def cut(arguments: Namespace) -> Summary:
     for half, name in zip(halves, outputs, strict=True):
         half.save(name)
         written.append({"output": name, "volume": half.volume, "area": half.area})
-    text = "\n".join(f"{printable(w['output'])}: volume {w['volume']:.6g}{shapes.named(unit, '³')}" for w in written)
+    text = "\n".join(
+        f"{printable(w['output'])}: volume {w['volume']:.6g}{shapes.unit_suffix(unit, '³')}" for w in written
+    )
     return {"input": arguments.shape, "units": unit, "halves": written}, text
 
 
@@ -480,7 +489,7 @@ def contour(arguments: Namespace) -> Summary:
         numbers = {"curves": len(surface)}
     else:
         shapes.save_level(surface, path, image, field if on_grid else None)
-        numbers = shapes.counts(surface)
+        numbers = shapes.sizes_of(surface)
     kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
     summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}
     return summary, f"{printable(path)}: {numbers[kind]} {kind}"

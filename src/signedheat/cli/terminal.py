@@ -38,10 +38,11 @@ REPLACED_CHARACTERS = str.maketrans(
         "╌": "-",
     }
 )
-"""Replacements for characters that a stream cannot encode."""
+"""Replacements for characters in streams that cannot encode them."""
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that stop a command."""
 SIGNAL_PAUSE = 1.0
-"""Seconds within which further signals are ignored."""
+"""Seconds after a signal. Signals that follow earlier are ignored."""
 
 
 def open_standard_streams() -> None:
@@ -72,12 +73,12 @@ def fitting(text: str, stream: TextIO) -> str:
 
 
 def say(text: str) -> None:
-    """Write a line to standard error; if that is closed or full, do nothing."""
+    """Write a line to standard error, or do nothing if that is closed or full."""
     _write_error("", text, "\n")
 
 
 def _write_error(before: str, text: str, after: str) -> None:
-    """Write text to standard error; control characters are removed from `text`, not from `before` and `after`."""
+    """Write three texts to standard error; `before` and `after` may have control characters, as for clearing a line."""
     stream = sys.stderr
     try:
         if stream is not None:
@@ -93,7 +94,7 @@ def say_error(error: BaseException) -> None:
 
 
 def write_out(text: str) -> None:
-    """Write to standard output."""
+    """Write text and the end of a line to standard output; raise `FileFormatError` if that is closed or full."""
     stream = sys.stdout
     try:
         if stream is None:
@@ -150,14 +151,14 @@ class ProgressBar:
 
 
 class Stopped(KeyboardInterrupt):
-    """Raised by signals; a subclass, because Python treats `KeyboardInterrupt` itself specially in ``python -c``."""
+    """Raised by `Signals`. Python treats `KeyboardInterrupt` itself, but not this, specially in ``python -c``."""
 
 
 class Signals:
-    """A context in which signals raise `Stopped`, so that temporary files are removed; `caught` is the last one.
+    """A context in which signals raise `Stopped`, so that temporary files are removed.
 
-    Signals that are ignored, as under ``nohup``, or that have another handler keep it. Outside the main thread the
-    context does nothing.
+    The attribute `caught` is the number of the last signal, or None. Signals that are ignored, as under ``nohup``, or
+    have another handler keep it. Outside the main thread, signals are not caught.
     """
 
     def __init__(self) -> None:
@@ -180,6 +181,7 @@ class Signals:
             signal.signal(number, before)
 
     def _raise(self, number: int, frame: FrameType | None) -> None:
+        """Raise `Stopped`, as the handler of a signal."""
         now = time.monotonic()
         if self.caught is not None and now - self._last < SIGNAL_PAUSE:
             return
@@ -187,7 +189,7 @@ class Signals:
         raise Stopped
 
     def _again(self, lost: sys.UnraisableHookArgs) -> None:
-        """Send a signal again whose exception was lost in a callback of a library; report other lost exceptions."""
+        """Send a signal again if its exception was lost in a callback of a library, as `sys.unraisablehook`."""
         if self.caught is None or not isinstance(lost.exc_value, Stopped):
             return self._hook(lost)
         self._last = -SIGNAL_PAUSE
@@ -195,7 +197,7 @@ class Signals:
 
 
 def _send(number: int) -> None:
-    """Send a signal to the main thread, which interrupts its waiting; on other systems, raise it in this thread."""
+    """Send a signal to the main thread, which interrupts its waiting, or where that is impossible to this thread."""
     if hasattr(signal, "pthread_kill"):
         signal.pthread_kill(threading.main_thread().ident or 0, number)
     else:
@@ -208,7 +210,7 @@ STANDARD_INPUTS = ("shape", "mesh", "field", "file")
 
 @dataclass(frozen=True)
 class StandardFiles:
-    """Replacements for ``-`` among the arguments."""
+    """What replaces ``-`` among the arguments."""
 
     takes_output: bool = False  # whether the result goes to standard output
     names: Mapping[str, str] = field(default_factory=dict)  # names to print in place of the paths of temporary files
@@ -222,7 +224,10 @@ class StandardFiles:
 
 @contextmanager
 def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
-    """Replace ``-`` among the arguments by temporary files, and write the result to standard output."""
+    """Within a ``with`` block, replace ``-`` among the arguments by temporary files.
+
+    At the beginning standard input is copied to such a file, and at the end the result to standard output.
+    """
     inputs = [name for name in STANDARD_INPUTS if getattr(arguments, name, None) == "-"]
     output = getattr(arguments, "output", None) == "-"
     listed = getattr(arguments, "files", []) == ["-"]
@@ -259,7 +264,7 @@ def standard_files(arguments: Namespace) -> Iterator[StandardFiles]:
 
 
 def _write(path: Path) -> None:
-    """Copy a file to standard output; if it does not exist, the result is in several files, which is refused."""
+    """Copy a file to standard output; raise an error if it does not exist, since then the result is several files."""
     if not path.is_file():
         raise FileFormatError(
             "the result is several files", remedy="name a file instead of standard output", path="standard output"

@@ -35,15 +35,15 @@ from .options import (
 from .terminal import ProgressBar, say, say_error
 
 DISPLAY_SECONDS = 5.0
-"""Seconds to wait for a display to answer."""
+"""Seconds to wait for a display to answer. After that, a picture is written instead."""
 DEMO_OFFSET = 0.15
-"""Offset of the surface in the demo."""
+"""Distance of the offset surface in the demo."""
 CURVE_ENDINGS = (".json",)
 """Extensions of files that hold only curves."""
 
 
 def check_files(arguments: Namespace) -> None:
-    """Take a second file with curves as ``--curves``; reject curves with several shapes."""
+    """Move a second file with curves to ``--curves``; exit with an error for curves with several shapes."""
     last = Path(arguments.files[-1]).suffix.lower()
     if len(arguments.files) == 2 and last in CURVE_ENDINGS and arguments.curves is None:
         arguments.curves = arguments.files.pop()
@@ -76,7 +76,7 @@ def check_files(arguments: Namespace) -> None:
     usage="FILE [FILE ...] [--curves CURVES] [options]",
 )
 def info(arguments: Namespace) -> Summary:
-    """Inspect files; one that cannot be read does not stop the others."""
+    """Report the contents and defects of files. If a file cannot be read, the others are reported nevertheless."""
     arguments.files = list(_without_folders(arguments.files))
     if len(arguments.files) == 1:
         return reports.report(arguments.files[0], arguments)
@@ -94,7 +94,7 @@ def info(arguments: Namespace) -> Summary:
 
 
 def _without_folders(names: list[str]) -> Iterator[str]:
-    """Return the names of files, with each folder replaced by its shapes."""
+    """Yield names of files, with each folder replaced by the files of shapes in it."""
     for name in names:
         if os.path.isdir(name):
             yield from (str(shape.path) for shape in inputs.expand([name]))
@@ -135,14 +135,14 @@ def view(arguments: Namespace) -> Summary:
 
 
 def has_window() -> bool:
-    """Whether there is a display, and PyVista to open a window on it."""
+    """Whether PyVista is installed and there is a display on which it can open a window."""
     if find_spec("pyvista") is None:
         return False
     return sys.platform in ("darwin", "win32") or display_answers()
 
 
 def display_answers() -> bool:
-    """Whether an X server answers; without one, VTK would silently show nothing."""
+    """Whether an X server answers, without which VTK would show nothing. If one is named and does not, print a line."""
     name = os.environ.get("DISPLAY", "")
     if not name:
         return False
@@ -161,13 +161,13 @@ def display_answers() -> bool:
 
 
 def shape_or_field(path: str) -> Any:
-    """Read the shape or field in a file."""
+    """Read the shape, polylines, field or image in a file, for `view`."""
     if is_planar(path):
         return sh.io.read_polylines(path)
     field = shapes.field_or_image(path)
     if isinstance(field, sh.io.LabelImage):
         with shapes.prefix_errors(path):
-            return shapes.thing_of(field)
+            return shapes.field_or_boundary(field)
     if field is not None:
         return field
     ending = Path(path).suffix.lower()
@@ -182,12 +182,15 @@ def shape_or_field(path: str) -> Any:
 
 
 def outputs(help: str) -> Option:
-    """Return the option that names any number of outputs."""
+    """Return the option ``-o`` that names any number of outputs, with its help."""
     return option("-o", "--output", metavar="OUT", nargs="+", action="extend", default=[], help=help)
 
 
 def take_inputs(arguments: Namespace, *names: str) -> None:
-    """Take inputs that follow ``-o`` from the end of the outputs; exit if some are missing."""
+    """Move inputs that follow ``-o`` from the end of the outputs to the arguments with these names.
+
+    Exit with an error if some are missing.
+    """
     given = [getattr(arguments, name) for name in names if getattr(arguments, name) is not None]
     missing = len(names) - len(given)
     if missing:
@@ -246,13 +249,15 @@ def deviation(arguments: Namespace) -> Summary:
     summary |= {"units": unit, "within": {f"{t:g}": deviations.within(t) for t in arguments.tolerance}, "worst": worst}
     lines = [
         f"{printable(arguments.scan)}: {counted(len(deviations.of_surface), 'point')}, 98 % of them "
-        f"{low:.4g} to {high:.4g}{shapes.named(unit)} off {printable(arguments.nominal)}, median {median:.4g}, "
+        f"{low:.4g} to {high:.4g}{shapes.unit_suffix(unit)} off {printable(arguments.nominal)}, median {median:.4g}, "
         f"root mean square {deviations.rms:.4g}"
     ]
     if deviations.beyond_rim.any():
         lines[0] += f"; {percent(summary['beyond_rim'])} beyond its rim"
-    lines += [f"within ±{t}{shapes.named(unit)}: {percent(share)}" for t, share in summary["within"].items()]
-    lines += [f"{row['deviation']:+.4g}{shapes.named(unit)} at {shapes.place(row['at'])}" for row in worst]
+    lines += [f"within ±{t}{shapes.unit_suffix(unit)}: {percent(share)}" for t, share in summary["within"].items()]
+    lines += [
+        f"{row['deviation']:+.4g}{shapes.unit_suffix(unit)} at {shapes.point_in_words(row['at'])}" for row in worst
+    ]
     for output in arguments.output:
         deviations.save(output)
     lines += [printable(output) for output in arguments.output]
@@ -280,11 +285,12 @@ def thickness(arguments: Namespace) -> Summary:
     solid, unit = shapes.solid_of(arguments, arguments.shape), shapes.unit_in_use(arguments, arguments.shape)
     with shapes.prefix_errors(arguments.shape):
         thicknesses = sh.wall_thickness(solid, resolution=arguments.resolution or 64)
-        least, place = thicknesses.thinnest
+        least, point = thicknesses.thinnest
     low, median, high = thicknesses.percentiles([5.0, 50.0, 95.0]).tolist()
     summary: dict[str, Any] = {"input": arguments.shape, "output": arguments.output, "units": unit}
-    summary |= {"thinnest": least, "at": place.tolist(), "percentiles": {"5": low, "50": median, "95": high}}
-    text = f"{printable(arguments.shape)}: thinnest {least:.4g}{shapes.named(unit)} at {shapes.place(place)}; "
+    summary |= {"thinnest": least, "at": point.tolist(), "percentiles": {"5": low, "50": median, "95": high}}
+    where = f"{shapes.unit_suffix(unit)} at {shapes.point_in_words(point)}"
+    text = f"{printable(arguments.shape)}: thinnest {least:.4g}{where}; "
     text += f"90 % of the area {low:.4g} to {high:.4g}, median {median:.4g}"
     if arguments.least is not None:
         summary["below"] = thicknesses.below(arguments.least)
@@ -346,6 +352,7 @@ def demo(arguments: Namespace) -> Summary:
 
 
 def _defects(shape: sh.TriangleMesh) -> str:
+    """Return words on the open, nonmanifold and inconsistent edges of a mesh."""
     counts: Any = inspection.inspect(shape)
     return (
         f"{counts.open_edges} open edges, {counts.nonmanifold_edges} nonmanifold, "
