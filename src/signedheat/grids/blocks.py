@@ -37,10 +37,10 @@ class Blocks:
     shape: tuple[int, int, int]  # nodes of the grid along each axis
 
     @classmethod
-    def of(cls, places: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
+    def of(cls, indices: NDArray[np.integer], shape: tuple[int, ...]) -> Blocks:
         """Make blocks from their (n, 3) indices, which need neither be sorted nor distinct."""
         cubes = -(-np.array(shape) // (BLOCK * CUBE))
-        ranked = np.asarray(places, dtype=np.int64).reshape(-1, 3)
+        ranked = np.asarray(indices, dtype=np.int64).reshape(-1, 3)
         cube = np.ravel_multi_index(tuple((ranked // CUBE).T), tuple(cubes))
         within = np.ravel_multi_index(tuple((ranked % CUBE).T), (CUBE,) * 3)
         _, order = np.unique(cube * CUBE**3 + within, return_index=True)
@@ -64,9 +64,9 @@ class Blocks:
         rows[number, a, b, c] = np.arange(len(self))
         return cubes, rows
 
-    def rows(self, places: NDArray[np.integer]) -> NDArray[np.int32]:
+    def rows(self, indices: NDArray[np.integer]) -> NDArray[np.int32]:
         """(k,) number of the block with each of (k, 3) indices; −1 if there is none, or outside the grid."""
-        wanted = np.asarray(places, dtype=np.int64)
+        wanted = np.asarray(indices, dtype=np.int64)
         limit = -(-np.array(self.shape) // BLOCK)
         inside = np.flatnonzero(((wanted >= 0) & (wanted < limit)).all(axis=1))
         cubes, rows = self.tables

@@ -335,7 +335,7 @@ class GridInterpolant:
     values: NDArray[Any]  # at the nodes, NaN where there are none
 
     def __call__(self, points: ArrayLike) -> Floats:
-        """(...) values at (..., d) points; next to nodes without a value, of the others around; NaN if none has one."""
+        """(...) values at (..., d) points, from those nodes around them that have a value; NaN if none has one."""
         queries, shape = query_points(points, self.grid.dimension)
         (values,) = in_chunks(self._values_at, queries)
         return shaped(values, shape)

@@ -56,7 +56,7 @@ class NodeSources(NamedTuple):
         return cls(empty.places, sums.reshape(-1, STRETCH, 4), shape, steps)
 
     def restricted(self, factors: Ints, shape: tuple[int, ...], steps: Floats) -> NodeSources:
-        """Restrict the sources to a coarser grid, by the transpose of linear interpolation; `factors`: `coarsening`."""
+        """Restrict the sources to a coarser grid by the transpose of linear interpolation; see `coarsening`."""
         nodes, values = self.nonzero()
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)
         return NodeSources.scattered(shape, steps, *interpolation_stencil(coarse, shape), values)

@@ -479,7 +479,10 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
 
 
 def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
-    """Make the lid of a loop of n vertices: (k, 3) added points, and triangles; indices from n on are added points."""
+    """Make the lid of a loop of n vertices: (k, 3) added points, and (m, 3) triangles.
+
+    Indices below n are those of the loop, and others are added points.
+    """
     corners = surface.vertices[loop]
     if len(loop) == 3:
         return np.empty((0, 3)), np.array([[0, 1, 2]])
@@ -502,14 +505,12 @@ def _of_flat_faces(corners: Floats, normals: Floats, bent: bool) -> tuple[Floats
     lid = lids.creased(corners, normals)
     if lid is not None:
         return lid
-    corner_indices = corners_of(corners)
-    if len(corner_indices) < 3:
+    ids = corners_of(corners)
+    if len(ids) < 3:
         return np.empty((0, 3)), fan(np.arange(len(corners)))
-    if bent and len(corner_indices) <= LOST_FACE_SIDES:
-        triangles = least_bent(corners, [corner_indices], normals[corner_indices], np.empty(0, dtype=np.int64), np.inf)[
-            0
-        ]
-        return np.empty((0, 3)), _with_sides(np.arange(len(corners)), corner_indices, triangles)
+    if bent and len(ids) <= LOST_FACE_SIDES:
+        triangles = least_bent(corners, [ids], normals[ids], np.empty(0, dtype=np.int64), np.inf)[0]
+        return np.empty((0, 3)), _with_sides(np.arange(len(corners)), ids, triangles)
     return None
 
 

@@ -380,7 +380,7 @@ def _beyond_rim(surface: FaceFeatures, front: NearestFaces) -> Bools:
     rim_vertices = np.zeros(len(surface.vertices), dtype=bool)
     on_rim = rim_edges[surface.edges]
     rim_vertices[surface.faces[on_rim]] = rim_vertices[np.roll(surface.faces, -1, axis=1)[on_rim]] = True
-    features, faces = front.features, front.faces
+    features, faces = front.features, front.faces  # features: 0 within a face, 1 to 3 on its sides, 4 to 6 at corners
     corners = (features - 1) % 3
     is_beyond = np.where(features > 3, rim_vertices[surface.faces[faces, corners]], on_rim[faces, corners])
     return is_beyond & (features > 0) & (front.distances > 0) & (np.abs(front.cosines) < STRAIGHT_ABOVE)

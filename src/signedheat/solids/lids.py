@@ -414,7 +414,7 @@ def is_flat(points: Floats) -> bool:
 
 
 def creased(loop: Floats, normals: Floats) -> tuple[Floats, Ints] | None:
-    """Make a lid of flat faces that close a loop: (k, 3) added points, and (m, 3) triangles; None if there is none.
+    """Make a lid of flat faces that close a loop, as (k, 3) added points and (m, 3) triangles; None if there is none.
 
     A run of sides in one plane is closed by a flat face that ends at a crease. Three runs that make up the whole loop
     are closed by faces to the point where their planes meet. No face folds back over the surface, whose (n, 3)

@@ -236,6 +236,7 @@ class SheetWall:
 
     def _beyond(self, points: Floats, nearest_points: NearestFaces) -> Floats:
         """(n,) distances of (n, 3) points beyond the rim, negative over the surface, given their nearest points."""
+        # features are 0 within a face, 1 to 3 on its sides, and 4 to 6 at its corners
         faces, features = nearest_points.faces, nearest_points.features
         rim_sides = np.full((len(points), 2), -1)
         edges, vertices = (features > 0) & (features < 4), features > 3

@@ -1,4 +1,4 @@
-"""Normals of point clouds: fitted where there are none, and oriented outwards; and surfaces fitted to points."""
+"""Normals of point clouds, fitted where there are none and oriented outwards, and surfaces fitted to points."""
 
 from __future__ import annotations
 

@@ -72,8 +72,8 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     # a slit has no width: where an edge leaves along one that arrives, the gap between them is nothing
     apart = (np.diff(ends[order], prepend=-1) != 0) | (np.diff(angles[order], prepend=0.0) > ANGLE_ROUNDING)
     order = order[np.lexsort((order >= n_edges, np.cumsum(apart)))]
-    names = np.concatenate([np.arange(n_edges), -1 - np.arange(n_edges)])[order]
-    following = _across_gaps(grouped(ends, n)[0], names)
+    edges_around = np.concatenate([np.arange(n_edges), -1 - np.arange(n_edges)])[order]
+    following = _across_gaps(grouped(ends, n)[0], edges_around)
     middles, lengths = vertices[edges].mean(axis=1), np.linalg.norm(vertices[heads] - vertices[tails], axis=1)
     centre = np.average(middles, weights=lengths + np.finfo(float).tiny, axis=0)
     farthest = np.argsort(-np.linalg.norm(middles - centre, axis=1), kind="stable")
@@ -82,24 +82,24 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
 
 
 @compiled
-def _across_gaps(starts: Ints, names: Ints) -> Ints:
+def _across_gaps(starts: Ints, edges_around: Ints) -> Ints:
     """(e,) the edge that follows each edge in a loop around a gap; gaps at a vertex nest like parentheses.
 
-    `names` lists the edges around each vertex, from `starts` on, in angular order: e if edge e leaves the vertex, and
-    −1 − e if it arrives.
+    `edges_around` lists the edges around each vertex, from `starts` on, in angular order: e if edge e leaves the
+    vertex, and −1 − e if it arrives.
     """
-    following, waiting = np.full(len(names) // 2, -1), np.empty(len(names) // 2, dtype=np.int64)
+    following, waiting = np.full(len(edges_around) // 2, -1), np.empty(len(edges_around) // 2, dtype=np.int64)
     for v in range(len(starts) - 1):
         depth = 0
         for turn in range(2):
             for k in range(starts[v], starts[v + 1]):
-                if names[k] >= 0:
+                if edges_around[k] >= 0:
                     if turn == 0:
-                        waiting[depth] = names[k]
+                        waiting[depth] = edges_around[k]
                         depth += 1
-                elif following[-1 - names[k]] < 0 and depth > 0:
+                elif following[-1 - edges_around[k]] < 0 and depth > 0:
                     depth -= 1
-                    following[-1 - names[k]] = waiting[depth]
+                    following[-1 - edges_around[k]] = waiting[depth]
     return following
 
 
@@ -107,16 +107,16 @@ def _across_gaps(starts: Ints, names: Ints) -> Ints:
 def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) -> tuple[Ints, Ints]:
     """Return edges loop by loop, and where each loop ends; walks along `following` edges begin in the order `order`."""
     n = len(tails)
-    place, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    index_in_walk, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     edges, stops, count, n_loops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0
     for first in order:
         edge, depth = first, 0
         while True:
-            begin = place[tails[edge]] if depth else -1
+            begin = index_in_walk[tails[edge]] if depth else -1
             if begin >= 0:
                 for k in range(begin, depth):
                     edges[count] = walk[k]
-                    place[tails[walk[k]]] = -1
+                    index_in_walk[tails[walk[k]]] = -1
                     count += 1
                 stops[n_loops] = count
                 n_loops += 1
@@ -124,7 +124,7 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
             if passed[edge]:
                 break
             passed[edge] = True
-            place[tails[edge]] = depth
+            index_in_walk[tails[edge]] = depth
             walk[depth] = edge
             depth += 1
             edge = following[edge]

@@ -186,9 +186,9 @@ class DigitalSurface(Displayed, Surface):
 
 
 STAYING = 0.003
-"""Weight that keeps vertices near the middle of their cells. With it, stairs some four voxels long become slopes. Mean
-error of normals of a ball, an ellipsoid and a torus of 96 voxels: 1.0° to 1.4°; at 0.01 1.8° to 2.1°, at 0.001 0.8° to
-1.3°; of a box along the axes, whose sides bend outwards, 5.5°, 4.4°, 6.5°."""
+"""Weight that keeps vertices near the middle of their cells. With it, stairs some four voxels long become slopes. The
+mean error of normals of a ball, an ellipsoid and a torus of 96 voxels is 1.0° to 1.4°, with 0.01 1.8° to 2.1°, and with
+0.001 0.8° to 1.3°. Of a box along the axes, whose sides bend outwards, it is 5.5°, 4.4° and 6.5°."""
 LARGEST_MOVE = 0.49
 """Largest move of a vertex along each axis, in voxels. Below a half, no two coincide, even in single precision."""
 

@@ -128,8 +128,8 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
 
 
 REFINED, ARRAYS_FULL, LIMIT_REACHED, PAUSED = 0, 1, 2, 3
-"""Why `refine` returned: no bad face is left; arrays are full; the vertex limit is reached; or it pauses so that
-progress is reported."""
+"""Why `refine` returned, in this order: no bad face is left, arrays are full, the vertex limit is reached, or it pauses
+so that progress is reported."""
 NARROW_ANGLE = np.pi / 3
 """Where segments meet at less than this angle, or a vertex has less in total, small angles cannot be avoided."""
 BAD_FACE_LISTS = 256
@@ -362,7 +362,7 @@ def push_edges_of(g: Gluing, agenda: Agenda, step: int) -> None:
 
 @compiled
 def insert(g: Gluing, agenda: Agenda, f: int, p: complex) -> None:
-    """Insert a vertex at p, in the frame of face f, or on the edge of the face that p nearly lies on."""
+    """Insert a vertex into the triangulation at p, in the frame of face f, or on the edge that p nearly lies on."""
     step = g.counts[N_STEPS]
     corners = corners_of(g, f)
     area = corners[1].real * corners[2].imag
@@ -436,8 +436,8 @@ def distance_to_opposite(g: Gluing, h: int, fraction: float) -> float:
 def split_segment(g: Gluing, agenda: Agenda, h: int, f: int, goal: Goal) -> bool:
     """Split the segment of halfedge h, so that face f can be improved; return False if the arrays have no room for it.
 
-    It is split in the middle; or beside a vertex that nearly lies on it; or, if segments meet at a small angle at one
-    end, at a power of two from that end (Ruppert 1995). A face with two sides on the segment is split instead.
+    It is split in the middle, or beside a vertex that nearly lies on it. If segments meet at a small angle at one end,
+    it is split at a power of two from that end (Ruppert 1995). A face with two sides on the segment is split instead.
     """
     e = g.edge[h]
     segment, length, step = agenda.segment[e], g.length[e], g.counts[N_STEPS]

@@ -178,8 +178,8 @@ class TangentPlanes:
 
 
 ALIKE, MISTAKEN, OPPOSED = 0, 1, 2
-"""How the normals of two points differ: by less than 120°; because one is inverted by mistake; or as on the two sides
-of a plate."""
+"""How the normals of two points differ: by at most 120°, or since one is inverted by mistake, or as on the two sides of
+a plate."""
 
 
 @compiled

@@ -112,7 +112,11 @@ def fitted_outward(points: Floats) -> tuple[PlaneFits, OutwardSigns]:
 
 
 def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> OutwardSigns:
-    """Find signs that orient (n, 3) axes outwards; if they were `given`, most of them may be right, and are kept."""
+    """Find signs that orient (n, 3) axes outwards.
+
+    Axes that were `given` are mostly right: all keep their sign, or all are inverted, unless much more than
+    contradictions of links explain speaks against single ones (`MOST_WRONG`).
+    """
     # links between chosen points; node m of the graph is the outside, node m + 1 the signs as given
     n = len(axes)
     chosen = spread_out(fits.points, KEPT_SPACING * fits.reaches) if fits.noisy else np.arange(n)

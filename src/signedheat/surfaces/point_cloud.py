@@ -154,7 +154,10 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def _distinct(self) -> tuple[Ints, LocalTriangulations]:
-        """(k,) ids of the distinct points, sorted by coordinates, and their local triangulations."""
+        """(k,) ids of the distinct points, sorted by coordinates, and their local triangulations.
+
+        Warn if normals or sides are uncertain; raise `GeometryError` if no triangle can be made.
+        """
         if self.points.shape[1] != 3:
             raise GeometryError(
                 f"distance is measured on point clouds in space: points need 3 coordinates, not {self.points.shape[1]}",

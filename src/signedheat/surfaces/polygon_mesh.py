@@ -136,7 +136,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @property
     def volume(self) -> float:
-        """Volume inside a watertight mesh, in cubic units; negative if it faces inwards: see `TriangleMesh.volume`."""
+        """Volume inside a watertight mesh, in cubic units, negative if it faces inwards: see `TriangleMesh.volume`."""
         return self.triangulation.volume
 
     @property
