@@ -106,7 +106,7 @@ class BlockValues:
         return _interpolate(self.blocks.tables, self.values, np.ascontiguousarray(points, dtype=np.float64), limit)
 
     def window(self, first: NDArray[np.integer], shape: tuple[int, int, int]) -> NDArray[np.float32]:
-        """Return the values in a box of `shape` nodes whose lowest node is `first`; NaN where there are none."""
+        """Return the values in a box of `shape` nodes whose lowest node is (3,) `first`; NaN where there are none."""
         low, high = first // BLOCK, -(-(first + np.array(shape)) // BLOCK)
         counts = high - low
         rows = self.blocks.rows(low + np.indices(counts).reshape(3, -1).T)

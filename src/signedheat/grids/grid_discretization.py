@@ -228,9 +228,9 @@ class GridIntegration(SolvesEach):
         return phi
 
     def fit(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Return φ near given levels at the samples: `solve` less its error there, spread by diffusion as normals are.
+        """Return φ near given levels at the samples, instead of Eq. 14.
 
-        This replaces Eq. 14.
+        It is φ of `solve` minus its error at the samples, which is spread to the nodes by diffusion, as normals are.
         """
         phi = self.solve(divergence, source)
         excess = deviation(source.at_samples(phi), source, levels)
@@ -251,7 +251,10 @@ class GridIntegration(SolvesEach):
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Solve Eq. 14 by an augmented Lagrangian; the remaining error is removed by changes at nodes near samples."""
+        """Return φ with exactly the given levels at the samples, by an augmented Lagrangian for Eq. 14.
+
+        The error that remains is removed by changes at nodes near samples.
+        """
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",
             self.grid.n_nodes,
@@ -275,7 +278,10 @@ class GridIntegration(SolvesEach):
         multipliers: Floats,
         start: Floats,
     ) -> Floats:
-        """Minimise ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), d the `deviation` of φ from the levels."""
+        """Return the φ that minimises ∫|∇φ − Y|² + Σ w (strength · d² + 2 · multiplier · d), starting at `start`.
+
+        The sum is over samples of weight w, and d is the `deviation` of φ from the levels there.
+        """
         volume = float(np.prod(self.grid.spacing))
         rows, weights = source.interpolation, source.weights / volume
         free = Levels(np.zeros_like(levels.values), levels.groups)

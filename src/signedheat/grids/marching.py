@@ -71,9 +71,9 @@ def level_lines(values: Floats, spacing: Floats, level: float) -> list[tuple[Flo
 
 
 def heights_above(values: Floats, spacing: Floats, level: float) -> Floats:
-    """Return values minus the level, kept away from zero so that crossings respect `CLEARANCE`.
+    """Return values at nodes minus the level, kept away from zero so that crossings respect `CLEARANCE`.
 
-    Raise `OutsideError` if all are on one side.
+    NaN stays NaN. Raise `OutsideError` if all values are on one side of the level.
     """
     height = values - level
     finite = height[np.isfinite(height)]
@@ -100,7 +100,7 @@ def _clear_of_zero(height: NDArray[np.floating], spacing: Floats) -> None:
 
 
 def closed_without_values(height: Floats) -> Floats:
-    """Return values in which NaN is replaced by positive numbers, so that the zero set is closed there.
+    """Return values at nodes in which NaN is replaced by positive numbers, so that the zero set is closed there.
 
     Crossings lie about `CAP` cells from neighbours with a value.
     """
@@ -149,7 +149,10 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
 
 
 def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, Ints] | None:
-    """Return vertices, in cells, and faces of the zero set in cells whose nodes all have values; None if empty."""
+    """Return (n, 3) vertices, in cells, and (m, 3) faces of the zero set in cells whose nodes all have values.
+
+    Return None if no such cell is crossed.
+    """
     finite = ~np.isnan(height)
     whole = np.zeros(height.shape, dtype=bool)  # each cell is marked at its last node
     inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)

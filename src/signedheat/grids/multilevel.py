@@ -109,7 +109,7 @@ def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
 
 
 def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[list[Level], tuple[int, ...], Floats]:
-    """Return the first `finest` levels of the hierarchy, without vectors, and shape and spacing of the next grid."""
+    """Return the first `finest` levels of the hierarchy, without vectors, and the next grid's shape and (4,) steps."""
     levels: list[Level] = []
     while len(levels) < finest and ((factors := coarsening(shape, steps)) > 1).any():
         levels.append(Level(None, None, factors))

@@ -160,9 +160,9 @@ def _(
 
 
 def _distances(values: Floats, spacing: Floats, pads: Ints) -> Floats:
-    """Return unsigned distances of the nodes that are not padding, `pads` along each axis, to the zero set.
+    """Return unsigned distances from the nodes to the zero set of values in d dimensions, without those of padding.
 
-    Every axis has at least two nodes.
+    (d,) `pads` nodes at both ends of each axis are padding. Every axis has at least two nodes.
     """
     signs = values.ndim > 1 and bool((np.abs(values) == 1).all())
     if signs:

@@ -40,7 +40,10 @@ def divergence(directions: NDArray[np.floating], spacing: Floats) -> Floats:
 
 
 def laplacian(values: Floats, spacing: Floats) -> Floats:
-    """Return C φ, Eq. 10 on a grid: the positive semidefinite Laplacian of 2d + 1 points, no flux through walls."""
+    """Return C φ (Eq. 10), the positive semidefinite Laplacian of values at the nodes of a grid.
+
+    It takes 2d + 1 nodes in d dimensions, and there is no flux through the walls.
+    """
     result = np.zeros_like(values)
     for axis, h in enumerate(spacing):
         rise = np.diff(values, axis=axis) / h**2
@@ -52,9 +55,9 @@ def laplacian(values: Floats, spacing: Floats) -> Floats:
 
 
 def solve_poisson(right_hand_side: Floats, spacing: Floats, overwrite: bool = False) -> Floats:
-    """Return φ of mean zero with ``C φ = b`` (Eq. 13), by the cosine transform, which diagonalises C.
+    """Return φ of mean zero at the nodes with ``C φ = b`` (Eq. 13), by the cosine transform, which diagonalises C.
 
-    With `overwrite`, the memory of b may be used.
+    `right_hand_side` is b; with `overwrite`, its memory may be used.
     """
     workers = n_threads()
     transformed = interruptible(scipy.fft.dctn, right_hand_side, type=2, overwrite_x=overwrite, workers=workers)

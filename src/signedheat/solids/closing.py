@@ -190,11 +190,11 @@ def least_bent(vertices: Floats, loops: list[Ints], normals: Floats, taken: Ints
 def _least_bent(
     corners: Floats, ids: Ints, normals: Floats, starts: Ints, taken: Ints, most: float
 ) -> tuple[Ints, Bools]:
-    """Return triangles, as indices into their loops, and whether the bend at each rim is at most `most`.
+    """Return (m, 3) triangles of h loops, as indices into their loops, and (h,) whether each bends at most `most`.
 
-    Corners, ids of vertices and normals are given loop by loop; loops begin at `starts`. In the body, `cost[i, j]` is
-    the bend of the best lid between corners i and j, and `rims[i, j]` the sum of lengths times squared angles where
-    this lid meets the rim.
+    The (n, 3) corners, (n,) ids of vertices and (n, 3) normals are given loop by loop, from (h + 1,) `starts` on. No
+    diagonal may have one of the sorted keys `taken`. In the body, `cost[i, j]` is the bend of the best lid between
+    corners i and j, and `rims[i, j]` the sum of lengths times squared angles where this lid meets the rim.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)

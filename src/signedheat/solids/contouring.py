@@ -243,7 +243,10 @@ def _vertices(
 def divided_along_creases(
     offset: ImplicitSurface, spacing: Floats, vertices: Floats, faces: Ints
 ) -> tuple[Floats, Ints]:
-    """Divide edges that cut off a crease of the surface at points on the crease, unless triangles would intersect."""
+    """Divide edges that cut off a crease of `offset` at points on the crease, unless triangles would intersect.
+
+    Return the (n, 3) vertices and (m, 3) faces of the divided mesh, with the given vertices first.
+    """
     new = np.ones(len(faces), dtype=bool)
     for _ in range(DIVISIONS if len(faces) <= MOST_CREASED_FACES else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)

@@ -99,7 +99,10 @@ def _filled(lines: list[Polyline]) -> tuple[Floats, Ints]:
 
 
 def _sheet(shape: Any, height: float) -> tuple[Floats, Ints]:
-    """Return the vertices and the consistently oriented faces of an open surface; raise if it reaches z = `height`."""
+    """Return (n, 3) vertices and (m, 3) consistently oriented faces of an open surface.
+
+    Raise if it is closed, or reaches the plane z = `height`.
+    """
     if isinstance(shape, PointCloud):
         raise GeometryError("points are no sheet", remedy="make a surface of them first", element="shape")
     mesh = shape.triangulation.joined

@@ -449,10 +449,11 @@ def spacing(points: Floats) -> Floats:
 
 @compiled
 def _nodes_for(points: Floats, balls: Floats, together: int) -> tuple[Ints, NDArray[np.int32]]:
-    """Return where the list of each group of `together` successive points begins, and the lists of tree nodes.
+    """List the tree nodes that act on each group of `together` successive points of (n, 3).
 
-    A node that all points of the group are far from is listed by its number, and acts as one dipole. A leaf near some
-    of them is listed by minus its number, and its items count one by one.
+    Return where the list of each group begins and ends, (groups + 1,), and the concatenated lists. A node that all
+    points of the group are far from is listed by its number, and acts as one dipole. A leaf near some of them is listed
+    by minus its number, and its items count one by one.
     """
     leaves, stack, count = len(balls) // 2, np.empty(64, dtype=np.int64), 0
     starts, nodes = np.zeros(-(-len(points) // together) + 1, dtype=np.int64), np.empty(leaves, dtype=np.int32)

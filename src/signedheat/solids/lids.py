@@ -481,7 +481,10 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 
 
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
-    """Find three runs that make up a loop and whose planes meet near it; return that point, and the runs, or None."""
+    """Find three runs that make up a loop of `n_sides` sides and whose planes meet near it.
+
+    Return the (3,) point where they meet, and the runs; None if there are no such runs.
+    """
     following = {run.first: run for run in runs}
     for first in runs:
         second = following.get((first.first + first.count) % n_sides)

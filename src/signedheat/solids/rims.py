@@ -105,7 +105,11 @@ def _across_gaps(starts: Ints, edges_around: Ints) -> Ints:
 
 @compiled
 def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) -> tuple[Ints, Ints]:
-    """Return edges loop by loop, and where each loop ends; walks along `following` edges begin in the order `order`."""
+    """Divide n directed edges into loops that pass each vertex once.
+
+    Return the edges loop by loop, and the end of each loop in this list. `tails` are the vertices that edges begin at,
+    and `following` the next edge of each. Walks begin at edges in the order `order`.
+    """
     n = len(tails)
     index_in_walk, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     edges, stops, count, n_loops = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), 0, 0
@@ -218,7 +222,7 @@ def _points_on(ends: Floats) -> tuple[Floats, Ints]:
 def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
     """Divide faces along the open edges of others that lie in them, such as a roof along the tops of walls.
 
-    Return the mesh, and the face that each of its faces is part of. So only a part of a face may bound something.
+    Return the divided mesh of m faces, and the (m,) faces of `mesh` that they are parts of.
     """
     points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
     table = edge_table(faces)

@@ -136,7 +136,10 @@ def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> l
 
 
 def _run(sides: Ints, following: Ints) -> Ints:
-    """Return sides in the order in which they follow each other around their rim; none if they are not connected."""
+    """Return (k,) sides in their order around the rim, or none if they are not connected.
+
+    `following` is the next side of every side.
+    """
     begins = sides[~np.isin(sides, following[sides])]
     if len(begins) > 1 or not len(sides):
         return sides[:0]

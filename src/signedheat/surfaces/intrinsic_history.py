@@ -211,7 +211,7 @@ SQUARE_LENGTH_ROUNDING = 1e-10
 
 @compiled
 def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the arrays `first` and `next_of_face` of `Links`."""
+    """Return the arrays `first`, (n_faces,), and `next_of_face`, (n, 3), of the `Links` of n steps."""
     first = np.full(n_faces, -1, np.int32)
     following_step = np.full((len(steps), 3), -1, np.int32)
     around, start = np.empty(3, np.int64), np.empty(3, np.int64)

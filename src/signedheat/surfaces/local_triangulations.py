@@ -340,9 +340,9 @@ def nonoverlapping_triangles(planes: TangentPlanes, triangles: Ints) -> Ints:
 
 
 def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
-    """Return faces in which each point of a candidate is a vertex: the nearest face to each that is not is split.
+    """Split the (m, 3) faces until each point of a (k, 3) candidate triangle is a vertex; return all faces.
 
-    Points without candidates are outliers.
+    Faces are split at a point that they are nearest to. Points in no candidate are outliers, and are left out.
     """
     while len(left := np.setdiff1d(candidates, faces)):
         nearest, _ = TriangleTree.of(points[faces]).nearest(points[left])
