@@ -121,7 +121,10 @@ class Levels:
     groups: Ints | None = None  # (s,) group of each sample
 
     def at(self, averages: Any) -> Levels:
-        """Return r averaged levels, by an (r, s) sparse matrix whose rows each average samples of a single group."""
+        """Return levels at r averages of samples, given by an (r, s) sparse matrix.
+
+        Each row of the matrix averages samples of a single group, to which the average then belongs.
+        """
         return Levels(
             averages @ self.values,
             None if self.groups is None else self.groups[averages.indices[averages.indptr[:-1]]],

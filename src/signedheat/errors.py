@@ -209,7 +209,7 @@ class OutsideError(SignedHeatError):
 
 
 class MemoryLimitError(SignedHeatError):
-    """A problem that does not fit in memory, or a result that does not fit on disk; found in advance where possible.
+    """A problem that does not fit in memory, or a result that does not fit on disk.
 
     See Also
     --------

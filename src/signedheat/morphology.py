@@ -143,7 +143,7 @@ def dilate(
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
         Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
     resolution : int, optional
-        Number of nodes along the longest side of that default grid; 128 by default.
+        Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
         Called as ``measure(shape, domain)`` in place of `signed_distance`, for instance to set its options as in
         ``partial(signed_distance, keep_overlaps=True)``.
@@ -195,20 +195,20 @@ def erode(
     Parameters
     ----------
     shape : shape, curves or polylines
-        As for `dilate`.
+        The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        The offset, in the units of the shape; not negative.
+        Distance of each offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
-        Domain of the distance; by default a grid around the shape.
+        Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
     resolution : int, optional
-        Number of nodes along the longest side of that grid; 128 by default.
+        Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
         Called as ``measure(shape, domain)`` in place of `signed_distance`.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The new boundary: closed, manifold, oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape.
 
     Raises
     ------
@@ -251,20 +251,20 @@ def opening(
     Parameters
     ----------
     shape : shape, curves or polylines
-        As for `dilate`.
+        The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        The offset, in the units of the shape; not negative.
+        Distance of each offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
-        Domain of the distance; by default a grid around the shape.
+        Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
     resolution : int, optional
-        Number of nodes along the longest side of that grid; 128 by default.
+        Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
         Called as ``measure(shape, domain)`` in place of `signed_distance`.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The new boundary: closed, manifold, oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape.
 
     Raises
     ------
@@ -306,20 +306,20 @@ def closing(
     Parameters
     ----------
     shape : shape, curves or polylines
-        As for `dilate`.
+        The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        The offset, in the units of the shape; not negative.
+        Distance of each offset, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
-        Domain of the distance; by default a grid around the shape.
+        Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
     resolution : int, optional
-        Number of nodes along the longest side of that grid; 128 by default.
+        Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
         Called as ``measure(shape, domain)`` in place of `signed_distance`.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The new boundary: closed, manifold, oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape.
 
     Raises
     ------
@@ -450,7 +450,7 @@ def shell(
     domain : Grid, optional
         Grid on which the distance is computed; by default one around the shape with room for the result.
     resolution : int, optional
-        Number of nodes along the longest side of that default grid; 128 by default.
+        Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
         Called as ``measure(shape, domain)`` in place of `signed_distance`, as for `dilate`.
     keep_outside : bool
@@ -556,7 +556,7 @@ def thicken(
         Ids of the faces to thicken, or a boolean for each face. To add material to some faces of a part, write
         ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=ids))``.
     resolution : int, optional
-        Number of nodes along the longest side of that default grid; 128 by default. The solid should be at least
+        Number of nodes along the longest side of the default grid; 128 by default. The solid should be at least
         two cells thick.
 
     Returns

@@ -221,13 +221,16 @@ class CutSurface(LinearDomain, Frozen):
         return (self.triangles.n_faces, 3)
 
     def _interpolant(self, values: Floats, beyond: Exact | None) -> CutInterpolant:
+        """Return the interpolant of (m, 3) values at the corners of faces, which is linear in faces."""
         return CutInterpolant(self, values)
 
     def _level_set(self, values: Floats, level: float, exact: Exact | None) -> list[Curve]:
+        """Return a level set of (m, 3) values at the corners of faces, as curves on a mesh doubled along the cut."""
         mesh, at_vertices = self._plain(values)
         return mesh._level_set(at_vertices, level, exact)
 
     def _expanded(self, values: Floats, beyond: Exact | None) -> tuple[TriangleMesh | PolygonMesh, Floats]:
+        """Return a mesh that is doubled along the cut, and (n,) values at its vertices."""
         return self._plain(values)
 
     def _plain(self, values: Floats) -> tuple[TriangleMesh | PolygonMesh, Floats]:

@@ -496,6 +496,7 @@ def with_turned(curves: Sequence[CurveOrPoints], turned: Bools) -> list[CurveOrP
 
 
 def _turned(curve: CurveOrPoints) -> CurveOrPoints:
+    """Return a curve with the inside on its other side: reversed, or with opposite normals if it has normals."""
     assert isinstance(curve, Curve)
     if curve.normals is None:
         return curve.reversed()

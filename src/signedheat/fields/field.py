@@ -563,8 +563,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
 
         Raises
         ------
-        OutsideError, GeometryError
-            As `contour`, and if the level set consists of lines.
+        OutsideError
+            If φ does not take the level anywhere on the domain.
+        GeometryError
+            If the level set consists of lines, values are infinite, or there is no cell with values.
         FileFormatError
             If the file name does not end in ``.ply``, or the file cannot be written.
 

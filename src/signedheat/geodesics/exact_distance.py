@@ -122,7 +122,10 @@ class PausedSearch:
     def start(
         cls, triangles: IntrinsicMesh, placed: PlacedSegments, tolerance: float, reach: float = np.inf
     ) -> PausedSearch:
-        """Start a search with the waves that leave the sources."""
+        """Make a search whose first windows and distances are those of the waves that leave the sources.
+
+        It ends at the distance `reach`, and `tolerance` is that of `distance_to_zero_line`.
+        """
         sources, pseudosources = placed.sources(triangles), is_pseudosource(triangles)
         pseudosources[sources.vertices] = True
         with np.errstate(all="ignore"):  # on faces of no size: `propagate_across` drops NaN
@@ -618,7 +621,7 @@ class Faces(NamedTuple):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh) -> Faces:
-        """Collect the arrays of an intrinsic mesh."""
+        """Make the arrays and lists for an intrinsic mesh."""
         table, (first_halfedge, halfedges) = triangles.edges, triangles.edges.halfedges
         first_corner, corners = grouped(triangles.corner_vertices.ravel(), triangles.n_vertices)
         corner_vertices, ends = (np.ascontiguousarray(ids) for ids in (triangles.corner_vertices, table.vertices))

@@ -88,7 +88,7 @@ class Places(NamedTuple):
 
     @classmethod
     def of(cls, triangles: IntrinsicMesh, located: LocatedPoints) -> Places:
-        """Find all faces that contain each point."""
+        """Find all faces that contain each point, such as both faces at a point on an edge."""
         owners, faces = incident_faces(triangles, located)
         order = np.lexsort([faces, owners])
         owners, faces = owners[order], faces[order]
@@ -110,7 +110,7 @@ class Routes(NamedTuple):
 
     @classmethod
     def on(cls, triangles: IntrinsicMesh) -> Routes:
-        """Make the arrays for a mesh."""
+        """Make the arrays for searches on a mesh, with all costs infinite."""
         n, corners = triangles.n_edges, triangles.corner_positions
         sides = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))

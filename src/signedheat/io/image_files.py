@@ -70,15 +70,15 @@ COPIES = 2
 class Image:
     """Values on a lattice of d axes in space."""
 
-    values: NDArray[Any]  # (n₁, …, n_d) one value for each place, indexed [x, y, z]
-    axes: Floats  # (d, d) steps between places along each axis of the image, in columns
-    origin: Floats  # (d,) the first place
+    values: NDArray[Any]  # (n₁, …, n_d) values, indexed [x, y, z]
+    axes: Floats  # (d, d) steps from value to value along each axis of the image, in columns
+    origin: Floats  # (d,) position of the first value
     space: str | None = None  # meaning of the axes of the world, as in NRRD files: ``"left-posterior-superior"``
     confidence: NDArray[Any] | None = None  # (n₁, …, n_d) confidence of a field in its values
 
     @property
     def spacing(self) -> Floats:
-        """(d,) distances between places along x, y, z; raises `FileFormatError` if the image is rotated."""
+        """(d,) steps between values along x, y, z; raises `FileFormatError` if the image is rotated."""
         spacing = np.diag(self.axes) if self.axes.ndim == 2 else np.zeros(self.values.ndim)
         if not np.array_equal(self.axes, np.diag(spacing)):
             raise FileFormatError("its axes are not x, y, z", remedy="resample the image along them")
@@ -86,7 +86,7 @@ class Image:
 
 
 def read_image(path: PathLike, formats: Collection[str], purpose: str) -> Image:
-    """Read an image of real numbers."""
+    """Read an image of real numbers in one of some formats; `purpose` is what it is read as, for messages."""
     read = format_for(path, {ending: IMAGE_READERS[ending] for ending in formats}, purpose)
     with reading(path):
         image = read(path)

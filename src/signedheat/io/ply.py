@@ -313,6 +313,7 @@ def _text_reader(body: bytes) -> Any:
     lines = iter([line.decode("ascii", errors="replace") for line in body.splitlines() if line.strip()])
 
     def read(element: _Element) -> dict[str, Any]:
+        """Read the columns of the next element by name."""
         if not element.properties:
             return {}
         rows = [line.split() for _, line in zip(range(element.count), lines, strict=False)]

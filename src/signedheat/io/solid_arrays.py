@@ -125,7 +125,7 @@ def read_solid(path: PathLike) -> Solid:
 
 
 def _key(arrays: Mapping[str, NDArray[Any]]) -> NDArray[np.uint8]:
-    """Return a fingerprint of the arrays of a solid, by which later changes are found."""
+    """Return a fingerprint of the arrays of a solid, as bytes, which later changes of the arrays do not match."""
     held = (arrays[name] for name in (*SOLID_ARRAYS, *SOURCE_ARRAYS) if name in arrays)
     return np.frombuffer(fingerprint(*held), dtype=np.uint8)
 

@@ -75,7 +75,7 @@ def load_cells(path: PathLike) -> Any:
 
 
 def store_cells(mesh: Any, path: PathLike) -> None:
-    """Write a `meshio.Mesh`."""
+    """Write a `meshio.Mesh` in the format given by the extension."""
     module = require(f"meshio.{format_for(path, MESHIO_MODULES, 'a tet mesh')}", "tet meshes")
     with writing(path), tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(), redirect_stderr(StringIO()):
         warnings.simplefilter("ignore")

@@ -350,6 +350,7 @@ class _Arrays:
         width = self.header.itemsize
 
         def take(start: int, length: int) -> tuple[bytes | memoryview, int]:
+            """Return `length` decoded bytes that begin at `start` in the data, and where they end in the data."""
             if not is_base64:
                 part: bytes | memoryview = data[start : start + length]
                 end = start + length
@@ -361,6 +362,7 @@ class _Arrays:
             return part, end
 
         def sizes(count: int) -> tuple[list[int], int]:
+            """Return the first `count` numbers of the header, and where they end in the data."""
             part, end = take(0, count * width)
             return np.frombuffer(part, self.header).tolist(), end
 

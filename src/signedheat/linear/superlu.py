@@ -93,7 +93,10 @@ def _substitute(
 def _substitute_columns(
     starts: NDArray[np.int32], rows: NDArray[np.int32], lower: NDArray[Any], pivots: Floats, x: NDArray[Any]
 ) -> None:
-    """Do the work of `_substitute` for all columns of x, (n, k), so that each entry of L is read once for all."""
+    """Replace the right-hand sides x, (n, k), by the solutions y of ``L D Lᴴ y = x``; L is stored by columns.
+
+    Each entry of L is read once for all right-hand sides.
+    """
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
             row, entry = rows[k], lower[k]

@@ -43,7 +43,7 @@ def by_first_use(ids: NDArray[np.integer], n: int) -> tuple[Ints, Ints]:
 
 @compiled
 def _component_numbers(n: int, tails: Ints, heads: Ints) -> Ints:
-    """Do the work of `connected_components` by union-find, with the least node of each tree as its root."""
+    """Return the component of each of n nodes that edges join, (n,), by union-find with the least nodes as roots."""
     parents = np.arange(n)
     for k in range(len(tails)):
         a, b = tails[k], heads[k]
@@ -113,7 +113,7 @@ def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -
 
 @compiled
 def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
-    """Do the work of `grouped` by a counting sort."""
+    """Return the (n + 1,) offsets of groups and the (k,) indices of their members, by a counting sort."""
     starts = np.zeros(n + 1, dtype=np.int64)
     for group in groups:
         starts[group + 1] += 1

@@ -72,18 +72,18 @@ class MergedSources:
 
     @classmethod
     def of(cls, parts: Sequence[CurveSegments]) -> MergedSources:
-        """Merge sources."""
+        """Merge the segments and nodes of several sources, each discretized by itself."""
         located = concatenated([p.nodes for p in parts])
-        first, who = unique_points(located)
+        first, ids = unique_points(located)
         offsets = np.cumsum([0] + [len(p.nodes) for p in parts])
         return cls(
             located[first],
-            np.concatenate([who[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
+            np.concatenate([ids[p.ends + o] for p, o in zip(parts, offsets, strict=False)]),
             np.concatenate([p.faces for p in parts]),
             np.concatenate([p.edges for p in parts]),
             np.concatenate([p.vectors for p in parts]),
             np.repeat(np.arange(len(parts)), [len(p.ends) for p in parts]),
-            [who[a:b] for a, b in pairwise(offsets)],
+            [ids[a:b] for a, b in pairwise(offsets)],
         )
 
     def parts(self, oriented: Sequence[bool]) -> list[CurveSegments]:

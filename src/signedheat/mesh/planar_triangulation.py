@@ -411,7 +411,10 @@ def _convex(x: Floats, a: int, b: int, c: int, d: int, flat: float) -> bool:
 
 @compiled
 def _locate(mesh: Planar, i: int) -> tuple[int, int, float]:
-    """Return the triangle that contains point i, and the result of `_side` for both: the nearest edge and its area."""
+    """Return the triangle t that contains point i, an edge 0–2 of t, and twice the signed area of this edge with i.
+
+    Of the edges of t it is the one with the least such area, which is 0 if i lies on it.
+    """
     x, tri, adj, count = mesh.x, mesh.tri, mesh.adj, mesh.room[1]
     t = count - 1
     for _ in range(count):
@@ -432,7 +435,7 @@ def _locate(mesh: Planar, i: int) -> tuple[int, int, float]:
 
 @compiled
 def _side(x: Floats, tri: Ints, t: int, i: int) -> tuple[int, float]:
-    """Return the edge of triangle t with which point i spans the least signed area, and twice this area."""
+    """Return the edge, 0 to 2, of triangle t with which point i spans the least signed area, and twice this area."""
     side, depth = 0, np.inf
     for k in range(3):
         turn = _turn(x, tri[t, k], tri[t, (k + 1) % 3], i)

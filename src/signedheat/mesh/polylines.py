@@ -38,6 +38,7 @@ def assemble_polylines(tails: Ints, heads: Ints, directed: bool = True) -> list[
     used = np.zeros(len(tails), dtype=bool)
 
     def walk(segment: int, start: int) -> tuple[list[int], list[bool], int]:
+        """Follow segments from a node; return them, whether each runs backwards, and the last node."""
         order, backwards, node = [], [], start
         while True:
             used[segment] = True

@@ -261,7 +261,10 @@ def mixed(a: int, b: int, c: int) -> int:
 
 @compiled
 def _weld(points: Floats, tolerances: Floats) -> Ints:
-    """Do the work of `welded` with a hash table of cells 16 tolerances wide."""
+    """Return (n,) the point into which each of (n, 3) points is merged, as `welded` does, for (3,) tolerances.
+
+    It uses a hash table of cells 16 tolerances wide.
+    """
     n = len(points)
     bits = 4
     while (1 << bits) < 2 * n:
@@ -310,7 +313,7 @@ def _cells_near(x: float, near: float, side: float) -> tuple[int, int, int]:
 
 @compiled
 def _same_rows(rows: Ints) -> Ints:
-    """Do the work of `same_rows` with a hash table of rows."""
+    """Return (n,) the first row that equals each of (n, k) rows, by a hash table of rows."""
     count, width = rows.shape
     size = 16
     while size < 2 * count:

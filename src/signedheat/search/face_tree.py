@@ -180,14 +180,17 @@ class FaceTree:
         return distances
 
     def search(self, points: Floats) -> NearestFaces:
-        """Find the nearest face of each of (n, 3) points; it is fastest if successive points are near each other."""
+        """Return the nearest face of each of (n, 3) points, with distances and nearest points on the faces.
+
+        The search is fastest if successive points are near each other.
+        """
         nearer = self._brought_near(points)
         faces, _ = self.nearest(nearer)
         result = feet_on(self.features, faces, nearer)
         return result if nearer is points else replace(result, distances=np.linalg.norm(points - result.places, axis=1))
 
     def _distances(self, points: Floats) -> Floats:
-        """Do the work of `distances` for a chunk of points."""
+        """Return (n,) distances of (n, 3) points to the nearest face, without parallel threads."""
         nearer = self._brought_near(points)
         if nearer is not points:
             return self.search(points).distances

@@ -37,7 +37,7 @@ def triangle_rows(corners: Floats) -> Floats:
 
 @np.errstate(all="ignore")
 def _rows(corners: Floats) -> Floats:
-    """Do the work of `triangle_rows` for a chunk of triangles."""
+    """Return the (m, 16) rows that `triangle_rows` describes, for (m, 9) corners of triangles, without threads."""
     rows = np.empty((len(corners), 16))
     rows[:, :3] = corners[:, :3]
     u, v = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))
@@ -233,7 +233,7 @@ def nearest_faces(
 def _descend(
     rows: Floats, tree: BoxTree, discs: Floats, points: Floats, run: int, best: Floats
 ) -> tuple[NDArray[np.int32], Floats]:
-    """Do the work of `nearest_faces` by descending a tree of boxes and discs.
+    """Return (n,) the nearest triangle of each point and (n,) its squared distance, by descending a tree.
 
     Successive points descend together, as many as the work array `best` is long. The compiler must not know this
     number.
