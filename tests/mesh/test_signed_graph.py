@@ -90,7 +90,7 @@ def test_noise_asks_for_more_neighbors_and_moves_points_to_the_surface():
     moved = points + rng.normal(scale=0.02, size=points.shape)
     noisy = fit_planes(moved, noise_scale(moved))
     assert noisy.n_neighbors > CLEAN_NEIGHBORS
-    assert np.abs(np.linalg.norm(noisy.places, axis=1) - 1).mean() < 0.5 * 0.02
+    assert np.abs(np.linalg.norm(noisy.points, axis=1) - 1).mean() < 0.5 * 0.02
     assert np.median(np.abs((noisy.axes * points).sum(axis=1))) > np.cos(np.radians(10))
 
 

@@ -153,7 +153,7 @@ class CutSurface(LinearDomain, Frozen):
         Returns
         -------
         list of Cut
-            One for each line, in the units of the surface; empty if the surface is not cut.
+            A `Cut` for each line, in the units of the surface. The list is empty if the surface is not cut.
 
         See Also
         --------

@@ -428,7 +428,10 @@ POINT, BEAM, FOCUS = 1.0, 0.0, -1.0
 """Kinds of waves. The values are signs by which `arrival` multiplies the distance from the point of a circular wave."""
 
 S0, S1, P, Q, SIGMA, KIND = range(6)
-"""Columns of the row of a window."""
+"""Columns of the row of a window.
+
+S0 and S1 are positions along its edge at which it begins and ends. P and Q are the direction of a straight wave, or the
+centre of a circular one, in the frame of the edge. SIGMA is the distance at the origin or at the centre."""
 
 
 @compiled
@@ -497,9 +500,9 @@ def trim(a: Floats, b: Floats) -> None:
 
 @compiled
 def trim_by(old: Floats, w: Floats, slack: float) -> None:
-    """Trim an end of window w in place where it is not nearer than an older one by more than `slack`.
+    """Shorten window w, in place, where it is not nearer by more than `slack` than an older window.
 
-    No gap is cut into its middle.
+    It is shortened at one end only, or removed, but no gap is cut into its middle.
     """
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:

@@ -262,10 +262,10 @@ def given_directions(
 
 
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
-    """Return (k,) signs by which the left sides of a curve's segments agree.
+    """Return (k,) signs, ±1, for k segments of a curve, that make their left sides agree on a nonoriented mesh.
 
-    The face of a segment, or the first face of its edge, decides which side is left. The sign is −1 where that face has
-    another orientation than those along most of the curve's length, and 1 elsewhere.
+    The left side of a segment is that in the layout of its face, or of the first face of its edge. The sign is −1 where
+    the orientation of this face differs from that of the faces along most of the curve's length.
     """
     telling, links, number = _agreement_around(triangles, faces, edges)
     signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]

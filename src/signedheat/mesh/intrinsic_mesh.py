@@ -175,7 +175,7 @@ class IntrinsicMesh(Frozen):
 
     @cached_property
     def _face_sums(self) -> tuple[sparse.csr_array, sparse.csr_array]:
-        """The two (m, e) matrices of `sums_in_faces`, for vectors and for their complex conjugates."""
+        """The (m, e) matrices by which `sums_in_faces` multiplies (e,) vectors, and those conjugated, and adds both."""
         shape = self.n_faces, self.n_edges
         starts, edges, directions = np.arange(0, 3 * self.n_faces + 1, 3), self.edges.face_edges, self.edge_directions
         if self.is_consistently_oriented:

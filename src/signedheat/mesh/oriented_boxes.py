@@ -128,7 +128,10 @@ def boxes_apart(first: Floats, a: int, second: Floats, b: int, slack: float) -> 
 
 @compiled
 def oriented_apart(oriented: Floats, a: int, b: int, slack: float) -> bool:
-    """Return whether the oriented boxes of nodes a and b are farther apart than a slack along a side of one of them."""
+    """Return whether the oriented boxes of nodes a and b are farther apart than a slack along a side of one of them.
+
+    A row of `oriented` has the centre of a box, its half widths along its sides, and the three unit vectors of these.
+    """
     x, y, z = oriented[b, 0] - oriented[a, 0], oriented[b, 1] - oriented[a, 1], oriented[b, 2] - oriented[a, 2]
     for d in range(3, 6):
         slack += BOX_ROUNDING * (oriented[a, d] + oriented[b, d])

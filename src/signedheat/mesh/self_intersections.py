@@ -116,9 +116,10 @@ def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
 
 
 def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
-    """Return (k, 3, 3) triangles that contain the arcs of directions which faces cover as seen from their hubs.
+    """Return for each of k faces a triangle that contains the directions to it from one of its vertices, (k, 3, 3).
 
-    Those of different hubs are moved apart, so that they do not overlap.
+    These are the hubs, (k,) vertex ids. The directions form an arc of the unit sphere around the hub, and the corners
+    of the triangle are the ends of the arc and a point beyond its middle. Triangles of different hubs are moved apart.
     """
     corner = np.argmax(faces == hubs[:, None], axis=1)
     ends = [faces[np.arange(len(faces)), (corner + k) % 3] for k in (1, 2)]
