@@ -159,7 +159,10 @@ class FaceCutter:
             self.pieces.append(NewSegment(*ends, -1, sub, vector, merged.owners[p]))
 
     def along_edge(self, edge: int) -> tuple[list[int], list[float], dict[int, int]]:
-        """Return the vertices along a split edge in order, the fraction of the edge at each, and their positions by id."""
+        """Return the vertices along a split edge, the fraction of the edge at each, and their positions in this order.
+
+        The positions are by vertex id.
+        """
         if edge not in self.chains:
             chain = self.on_edge[edge]
             tail, head = self.triangles.edges.vertices[edge].tolist()

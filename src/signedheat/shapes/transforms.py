@@ -164,7 +164,7 @@ def joined_triangles(parts: Sequence[TriangleMesh | PolygonMesh], origin: Floats
 
 
 def concatenated(bodies: Sequence[Body]) -> Body:
-    """Return the vertices and faces of several bodies as those of one, without merging vertices."""
+    """Join bodies, which are (n, 3) vertices and (m, 3) faces each, to a single one, without merging vertices."""
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
     faces = [own + start for (_, own), start in zip(bodies, starts, strict=False)]
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)

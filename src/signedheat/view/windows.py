@@ -104,7 +104,7 @@ def _add_colors(plotter: Any, mesh: Any, look: dict[str, Any], **options: Any) -
 
 
 def _add_isolines(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
-    """Add the isolines of the values of a PyVista mesh, and a heavier line at zero."""
+    """Add the isolines of the values of a PyVista mesh, and a heavier line at zero, as `_options_of` says in `look`."""
     for levels, width in ((look["levels"], 1.0), ([0.0] if look["zero"] else [], 4.0)):
         lines = mesh.contour(list(levels), scalars=VALUES_NAME) if len(levels) else None
         if lines is not None and lines.n_points:
@@ -120,7 +120,10 @@ def _add_zero_set(plotter: Any, field: Any) -> None:
 
 
 def _add_section(plotter: Any, mesh: Any, look: dict[str, Any]) -> None:
-    """Add the section of a PyVista mesh with the plane normal to y through its middle, and the box around it."""
+    """Add the section of a PyVista mesh with the plane normal to y through its middle, and the box around it.
+
+    `look` is what `_options_of` returns.
+    """
     plotter.add_mesh(mesh.outline(), color=LINE)
     section = mesh.slice(normal="y")
     _add_colors(plotter, section, look, lighting=False)
