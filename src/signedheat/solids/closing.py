@@ -115,7 +115,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     rows, near, distances = _within(samples, loop, patches, reach)
     weights = samples.areas[near] * (1.0 - (distances / reach) ** 2)  # falls to 0 at the reach
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
-    means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))  # over samples near each place
+    means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))  # over samples near each point
     positions, corners = samples.positions - loop[0], loop - loop[0]
     middle, mean_positions = means @ samples.normals, means @ positions
 
@@ -147,9 +147,9 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
 
 
 def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
-    """Pair the (n, 3) points of a loop with samples within reach, of the patch that ends there.
+    """Pair the (n, 3) points of a loop with the samples within reach that are on the patch, (n,), of the point.
 
-    Return (p,) points, (p,) samples and (p,) distances.
+    Return (p,) indices of points, (p,) indices of samples, and (p,) distances.
     """
     rim, near = PointTree(loop), PointTree(samples.positions)
     pairs = rim.sparse_distance_matrix(near, reach, output_type="ndarray")

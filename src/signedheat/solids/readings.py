@@ -51,7 +51,7 @@ def as_given(chain: Chain, reversed: Bools) -> Reading:
     left_open, left_once = (chain.open_edges(counts, complexes) for counts in (multiplicities, np.sign(multiplicities)))
     counts = np.where((left_once <= left_open)[complexes], np.sign(multiplicities), multiplicities)
     closes = (np.minimum(left_open, left_once) == 0) & (np.bincount(complexes, counts != 0) > 0)
-    whole = _one_way(chain, counts, closes)
+    whole = _closed_one_way(chain, counts, closes)
     turned = np.zeros(len(counts), dtype=bool)
     if whole.all():
         every = np.ones(int(complexes.max(initial=-1)) + 1, dtype=bool)
@@ -66,10 +66,10 @@ def as_given(chain: Chain, reversed: Bools) -> Reading:
     return Reading(counts, ~whole & (counts < 0), pieces, every, 0, reversed, whole)
 
 
-def _one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
-    """(m,) whether each triangle is in a component that `closes`, (c,), and faces outwards, or inwards, as a whole.
+def _closed_one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
+    """(m,) whether the complex of each triangle is closed, (c,) `closes`, and faces outwards, or inwards, as a whole.
 
-    Levels of a closed component are the same all over a piece, so that one triangle of each piece is enough.
+    Levels of a closed complex are the same all over a piece, so that one triangle of each piece is enough.
     """
     if not closes.any():
         return np.zeros(len(counts), dtype=bool)

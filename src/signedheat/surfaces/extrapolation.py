@@ -101,7 +101,10 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
 
 
 def blended(sources: Sequence[SourceTerm], directions: Iterable[NDArray[Any]]) -> NDArray[Any]:
-    """Combine the directions (m,) of each of the sources of `lowered_for_times` to Y on all faces."""
+    """Return Y on all faces, (m,), from the directions, (m,), computed for each source of `lowered_for_times`.
+
+    Parts of the surface in which curves end have the directions of the last source, the others those of the first.
+    """
     everywhere, *at_ends = directions
     for ending in at_ends:
         assert isinstance(sources[0], SurfaceSource)

@@ -333,7 +333,7 @@ def sector(g: Gluing, corner: int) -> float:
 
 @compiled
 def narrow_vertices(g: Gluing) -> Bools:
-    """(n,) whether two segments meet at less than 60° at each vertex, or its total angle is less than 60°."""
+    """(n,) which vertices have two segments that meet at less than 60°, or a total angle of less than 60°."""
     narrow = np.zeros(g.counts[N_VERTICES], dtype=np.bool_)
     for corner in range(3 * g.counts[N_FACES]):
         if not narrow[g.tail[corner]]:

@@ -130,7 +130,7 @@ def transfer_segments(
 ) -> CurveSegments:
     """Transfer segments from the triangles `before` the refinement to those at the end of the history.
 
-    They are cut where they cross edges of these.
+    They are cut where they cross edges of the latter.
     """
     after = history.after
     none = np.zeros((len(source.nodes), 0, 3))
@@ -157,8 +157,8 @@ def transfer_segments(
     starts, ends = locate_points(after, faces, lines.starts), locate_points(after, faces, lines.ends)
     located = concatenated([nodes, ends, starts])
     joined = _joined(after, located, faces, owners, source.ends)
-    who = unique_points(located)[1]
-    keep = who[joined[:, 0]] != who[joined[:, 1]]
+    point_ids = unique_points(located)[1]
+    keep = point_ids[joined[:, 0]] != point_ids[joined[:, 1]]
     owners, faces, carried, joined = owners[keep], faces[keep], carried[keep], joined[keep]
     starts, ends = starts[keep], ends[keep]
 
@@ -172,10 +172,10 @@ def transfer_segments(
     edges, side = edges_between(after, faces, begin, finish)
     used = np.union1d(np.arange(len(nodes)), joined)
     place = np.searchsorted(used, joined)
-    chosen, who = unique_points(located[used])
+    chosen, point_ids = unique_points(located[used])
     return CurveSegments(
         located[used][chosen],
-        who[place],
+        point_ids[place],
         faces,
         edges,
         np.where(edges >= 0, after.in_edge_frames(grown, faces, side), grown),

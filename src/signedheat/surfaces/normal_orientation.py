@@ -136,7 +136,7 @@ def outward_signs(fits: PlaneFits, axes: Floats, given: bool = False) -> Outward
     signs[chosen] = decision[:m] * decision[m if sided else m + 1]
     rest = np.flatnonzero(signs == 0)
     if len(rest):
-        signs[rest] = _followed(kept_points, axes[chosen] * signs[chosen, None], fits.points[rest], axes[rest])
+        signs[rest] = _nearest_signs(kept_points, axes[chosen] * signs[chosen, None], fits.points[rest], axes[rest])
     coherence = links.coherence(decision)
     if given and min((signs < 0).mean(), (signs > 0).mean()) <= MOST_WRONG * (1 - coherence):
         signs = np.full(n, 1.0 if signs.sum() >= 0 else -1.0)
@@ -152,7 +152,7 @@ def _lone(points: Floats, reaches: Floats) -> Bools:
     return reaches > OUTLIER_DISTANCE * np.median(reaches[near.reshape(len(points), -1)[:, 1:]], axis=1)
 
 
-def _followed(points: Floats, normals: Floats, queries: Floats, axes: Floats) -> Floats:
+def _nearest_signs(points: Floats, normals: Floats, queries: Floats, axes: Floats) -> Floats:
     """(k,) signs that make the (k, 3) axes at `queries`, (k, 3), agree with the (n, 3) normals at nearest points."""
     distances, near = PointTree(points).query(queries, k=min(6, len(points)))
     distances, near = distances.reshape(len(queries), -1), near.reshape(len(queries), -1)

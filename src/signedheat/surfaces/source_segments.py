@@ -90,8 +90,8 @@ def _(source: Curve, triangles: IntrinsicMesh, positions: Positions = None, numb
     start = np.arange(source.n_segments)
     located, start, end, segment = join(triangles, located, start, (start + 1) % source.n_points, name)
     faces = shared_faces(triangles, located[start], located[end])
-    first, who = unique_points(located)
-    ends = np.stack([who[start], who[end]], axis=1)
+    first, point_ids = unique_points(located)
+    ends = np.stack([point_ids[start], point_ids[end]], axis=1)
     at_start = barycentric_in(triangles, faces, located[start])
     at_end = barycentric_in(triangles, faces, located[end])
     corners = triangles.corner_positions[faces]
@@ -226,7 +226,7 @@ def _converted(domain: Surface, source: object) -> object:
 
 
 def _is_point(domain: Surface, curve: Curve) -> bool:
-    """Whether all points of a curve coincide."""
+    """Whether all points of a curve coincide, up to `SOURCE_POINT` times the size of the surface."""
     triangles = domain.triangulation
     if not hasattr(triangles, "vertices"):
         return False

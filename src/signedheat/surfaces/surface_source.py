@@ -204,21 +204,21 @@ def line_elements(part: CurveSegments, spacing: float) -> Floats:
 def joined(parts: Sequence[CurveSegments]) -> tuple[LocatedPoints, Ints]:
     """Return the distinct nodes of all sources, and the (k, 2) ids of those at the ends of all segments."""
     nodes = concatenated([p.nodes for p in parts])
-    first, who = unique_points(nodes)
-    return nodes[first], ends_among(parts, who)
+    first, point_ids = unique_points(nodes)
+    return nodes[first], ends_among(parts, point_ids)
 
 
-def ends_among(parts: Sequence[CurveSegments], who: Ints) -> Ints:
-    """(k, 2) point ids at the ends of all segments of all parts; `who` are the (s,) point ids of all nodes."""
+def ends_among(parts: Sequence[CurveSegments], point_ids: Ints) -> Ints:
+    """(k, 2) point ids at the ends of all segments of all parts; `point_ids` are the (s,) point ids of all nodes."""
     offsets = np.cumsum([0] + [len(p.nodes) for p in parts[:-1]])
     ends: Ints = np.concatenate([p.ends + offset for p, offset in zip(parts, offsets, strict=True)])
-    return who[ends]
+    return point_ids[ends]
 
 
 def connected(parts: Sequence[CurveSegments]) -> Ints:
     """(s,) connected component, of the union of all sources, of each node; numbered by first appearance."""
-    first, who = unique_points(concatenated([p.nodes for p in parts]))
-    return connected_components(len(first), *ends_among(parts, who).T)[who]
+    first, point_ids = unique_points(concatenated([p.nodes for p in parts]))
+    return connected_components(len(first), *ends_among(parts, point_ids).T)[point_ids]
 
 
 def free_end_arcs(triangles: IntrinsicMesh, edges: Ints, vertices: Ints, least: float) -> tuple[Ints, Complexes]:
