@@ -5,6 +5,7 @@ import pytest
 
 import signedheat as sh
 from shapes.grid_cases import sphere
+from signedheat.compiled import compiled
 from signedheat.samples import torus
 from signedheat.search.face_tree import FaceFeatures, FaceTree
 from signedheat.search.nearest_triangles import foot_on_triangle
@@ -19,6 +20,16 @@ def soup(n, seed=0):
     return sh.TriangleMesh(corners.reshape(-1, 3), np.arange(3 * n).reshape(-1, 3))
 
 
+@compiled
+def least_squares_of(rows, points):
+    """(n,) the least squared distance of each point to a face, all of which are tried."""
+    least = np.full(len(points), np.inf)
+    for i in range(len(points)):
+        for f in range(len(rows)):
+            least[i] = min(least[i], foot_on_triangle(rows, f, points[i, 0], points[i, 1], points[i, 2])[0])
+    return least
+
+
 @pytest.mark.parametrize(
     "mesh", [sphere(700), torus(n_around=40, n_across=20), soup(301), soup(3), sphere(80, 1e-3, (50.0, 0, 0))]
 )
@@ -28,8 +39,7 @@ def test_the_nearest_face_is_that_of_all(mesh):
     rng = np.random.default_rng(1)
     middle, size = mesh.vertices.mean(axis=0), np.ptp(mesh.vertices, axis=0).max()
     points = middle + size * np.concatenate([rng.uniform(-0.6, 0.6, (150, 3)), rng.uniform(-4, 4, (150, 3))])
-    squares = [[foot_on_triangle(features.rows, f, *p)[0] for f in range(len(features.rows))] for p in points]
-    nearest = np.sqrt(np.min(squares, axis=1))
+    nearest = np.sqrt(least_squares_of(features.rows, points))
     np.testing.assert_allclose(tree.distances(points), nearest, rtol=1e-9, atol=1e-12 * size)
     np.testing.assert_allclose(tree.search(points).distances, nearest, rtol=1e-9, atol=1e-12 * size)
 
