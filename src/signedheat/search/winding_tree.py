@@ -23,7 +23,7 @@ from ..mesh.unit_vectors import unit
 from ..parallel import ROWS_PER_TASK, in_chunks
 
 OFF_FACE = 1e-6
-"""Distance of test points in front of a face and behind it, relative to the square root of its area."""
+"""Distance of test points in front of a face and behind it, relative to its size. Nearer points count as in it."""
 APEX_IN_PLANE = 1e-9
 """Volume that a point spans with a triangle, relative to the product of its distances to the corners, up to which the
 point counts as lying in the plane of the triangle."""
@@ -50,18 +50,20 @@ class WindingTree:
 
         For a point on a face it is that on one of the sides.
         """
+        return self._numbers(points, 0.0)
+
+    def levels(self, points: Floats) -> Floats:
+        """Return (n,) winding numbers around (n, 3) points; for points on faces, the mean of those on both sides."""
+        return self._numbers(points, OFF_FACE)
+
+    def _numbers(self, points: Floats, thickness: float) -> Floats:
+        """Return (n,) winding numbers around (n, 3) points, 0 of the faces within whose thickness they lie."""
         corners = np.ascontiguousarray(self.triangles).reshape(-1, 9)
         points = np.ascontiguousarray(points)  # the kernel is compiled for one kind of array
-        (numbers,) = in_chunks(lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk),), points)
+        (numbers,) = in_chunks(
+            lambda chunk: (_winding(corners, self.tree.items, self._moments, chunk, thickness),), points
+        )
         return numbers
-
-    def levels(self, places: Floats, normals: Floats, areas: Floats) -> Floats:
-        """Return (n,) means of the winding numbers on both sides of points on faces.
-
-        The points and the unit normals of their faces are (n, 3), and the areas of the faces (n,).
-        """
-        steps = OFF_FACE * np.sqrt(areas)[:, None] * normals
-        return 0.5 * (self.numbers(places - steps) + self.numbers(places + steps))
 
     def behind(self, faces: NDArray[np.integer], places: Floats) -> Floats:
         """Return (n,) winding numbers just behind (n, 3) points in (n,) faces, which are not near their edges."""
@@ -99,10 +101,11 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
 
 
 @compiled
-def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> Floats:
+def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats, thickness: float) -> Floats:
     """Return (n,) winding numbers, from the solid angles of faces in near leaves and the moments of far nodes.
 
-    `corners` are (m, 9), `items` those of the tree, and `moments` the result of the function `_moments`.
+    `corners` are (m, 9), `items` those of the tree, and `moments` the result of the function `_moments`. Points in a
+    face, up to a height of `thickness` relative to its size, see as much of it on one side as on the other: nothing.
     """
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)
@@ -139,7 +142,7 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats) -> F
                         if rest > abs(volume):
                             share = volume / rest
                             real, imaginary = real - imaginary * share, imaginary + real * share
-                        elif volume != 0.0:
+                        elif abs(volume) > -thickness * rest:  # near the face, half of its angle is near a half turn
                             total += 2.0 * np.arctan2(volume, rest)
                 if imaginary != 0.0:
                     total += 2.0 * np.arctan2(imaginary, real)

@@ -17,8 +17,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..mesh.components import connected_components, first_members, sums_of
-from ..mesh.triangles import area_vectors, cone_volumes
-from ..mesh.unit_vectors import unit
+from ..mesh.triangles import cone_volumes
 from ..parallel import PointTree
 from ..search.winding_tree import WindingTree
 from .chain import Chain
@@ -317,9 +316,8 @@ def _nested(
     names, labels = np.unique(owners, return_inverse=True)
     faces, points = sampled(Pieces(triangles, labels), 16 * len(names))
     probes, own = owners[faces], np.abs(counts[counted[faces]])
-    normals = unit(area_vectors(triangles[faces]))
     tree = WindingTree.of(directed(chain.triangles, counts * outward[pieces]))
-    around = tree.levels(points, normals, chain.areas[counted[faces]]) - 0.5 * own
+    around = tree.levels(points) - 0.5 * own
     depth = np.full(n, np.inf)
     np.minimum.at(depth, probes, np.round(around - 0.25))  # a copy a rounding apart, at level ½, is not around
     depth = np.where(closed & np.isfinite(depth), depth, 0.0)
@@ -373,7 +371,7 @@ def open_bounding(
             whole = replace(whole, within=within)
             weights = whole.weights(fixed, weights)
     elif len(closed):
-        around = WindingTree.of(closed).levels(whole.points, whole.normals, whole.areas)
+        around = WindingTree.of(closed).levels(whole.points)
         whole = replace(whole, within=-around)
     while alive.any():
         names, system = np.flatnonzero(alive), whole.chosen(alive)

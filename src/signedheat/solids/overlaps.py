@@ -22,8 +22,6 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.box_tree import BoxTree
 from ..mesh.components import grouped
-from ..mesh.triangles import area_vectors, face_areas
-from ..mesh.unit_vectors import unit
 from ..parallel import PointTree
 from ..search.winding_tree import WindingTree, mean_angle
 from .gauss import TREE_FACES, Dipoles, Matrix, Pieces, sampled
@@ -52,10 +50,8 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     for group in np.unique(owners[~summed]):
         chosen = np.flatnonzero(owners == group)
         members = order[starts[group] : starts[group + 1]]
-        tree, chosen_triangles = WindingTree.of(directed(triangles[members], counts[members])), triangles[faces[chosen]]
-        levels[chosen] = tree.levels(
-            chosen_triangles.mean(axis=1), unit(area_vectors(chosen_triangles)), face_areas(chosen_triangles)
-        )
+        tree = WindingTree.of(directed(triangles[members], counts[members]))
+        levels[chosen] = tree.levels(triangles[faces[chosen]].mean(axis=1))
     return levels
 
 
@@ -165,12 +161,11 @@ def bodies_around(
     away = np.flatnonzero(~own)
     if len(away):
         homes[away] = homes[own][PointTree(points[own]).query(points[away])[1]]
-    normals = np.concatenate([system.normals, np.zeros(rims.middles.shape)])
     sizes = np.concatenate([system.areas, rims.lengths])
     order = np.argsort(numbers, kind="stable")
     parts = np.split(triangles[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
     parts += [closed] * (len(closed) > 0)  # closed surfaces count as one more body
-    rows, others, numbers_there = _windings(points, normals, sizes, parts)
+    rows, others, numbers_there = _windings(points, parts)
     homes_there = homes[rows]
     weights = np.where(own, sizes, 0.0)
     on_rim = np.arange(len(points)) >= n
@@ -193,11 +188,11 @@ def bodies_around(
     ignored = (homes_there != others) & ((united & not_nested) | (enclosed & stays))
     subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
     everything = WindingTree.of(np.concatenate(parts[:count]))
-    around = everything.levels(system.points, system.normals, system.areas)
+    around = everything.levels(system.points)
     return around - np.bincount(rows[subtracted], numbers_there[subtracted], n)
 
 
-def _windings(points: Floats, normals: Floats, sizes: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
+def _windings(points: Floats, parts: list[Floats]) -> tuple[Ints, Ints, Floats]:
     """Pair (n, 3) points with the bodies in whose boxes they lie: (k,) points, (k,) bodies, (k,) winding numbers.
 
     A body is (m, 3, 3) triangles of `parts`. On its surface, its winding number is the mean of both sides.
@@ -213,5 +208,5 @@ def _windings(points: Floats, normals: Floats, sizes: Floats, parts: list[Floats
     for body, (begin, end) in enumerate(pairwise(np.searchsorted(bodies, np.arange(len(parts) + 1)))):
         if end > begin:
             batch = rows[begin:end]
-            windings[begin:end] = WindingTree.of(parts[body]).levels(points[batch], normals[batch], sizes[batch])
+            windings[begin:end] = WindingTree.of(parts[body]).levels(points[batch])
     return rows, bodies, windings
