@@ -14,8 +14,9 @@ from signedheat import samples
 from signedheat.errors import InexactWarning
 from signedheat.mesh.pinches import separated
 from signedheat.mesh.welding import indexed
+from signedheat.search.winding_tree import winding_sums
 from signedheat.solids import kept_faces
-from signedheat.solids.bodies import Bodies, crossing_faces, same_solid, whole_boundary
+from signedheat.solids.bodies import Bodies, crossing_faces, same_solid, whole_boundary, without_common
 from signedheat.solids.winding import Windings
 
 BARS = [
@@ -169,3 +170,17 @@ def test_crossings_are_as_deep_as_their_shallower_side():
         assert len(crossing_faces(points, faces, np.full(2, depth))) == crossing
     fan = np.array([[0, 1, 2], [0, 4, 5]])  # touches at a corner only
     assert not len(crossing_faces(points, fan, np.full(2, 1e-9)))
+
+
+def test_what_two_surfaces_do_not_share_winds_by_their_difference():
+    random = np.random.default_rng(5)
+    ball, block = corners(samples.sphere(2)), corners(box((-0.5, -0.4, -0.3), (1.5, 1.2, 0.9)))
+    both = np.concatenate([ball, block])
+    turned = np.take_along_axis(both, (random.integers(0, 3, (len(both), 1)) + np.arange(3))[..., None] % 3, axis=1)
+    shuffled = random.permutation(turned)
+    assert not len(without_common(shuffled, both))
+    rest = without_common(shuffled, np.concatenate([block, block[:4]]))
+    assert len(rest) == len(ball) + 4
+    points = random.uniform(-1, 1, (50, 3))
+    numbers = [winding_sums(triangles, points) for triangles in (rest, ball, block[:4])]
+    np.testing.assert_allclose(numbers[0], numbers[1] - numbers[2], atol=1e-12)

@@ -26,12 +26,14 @@ from ..mesh.pinches import separated
 from ..mesh.self_intersections import overlap, overlapping_faces
 from ..mesh.triangles import area_vectors, face_areas, halved, heights, part_volumes
 from ..mesh.unit_vectors import unit
-from ..mesh.welding import ONE_PLACE, coincident_faces, indexed, same_positions, tolerances
+from ..mesh.welding import ONE_PLACE, coincident_faces, distinct_rows, indexed, same_positions, tolerances
 from ..packages import lazy_module
+from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from .closing import fan
+from .overlaps import directed
 from .regions import TOLERANCES, cut_and_sided
-from .winding import Windings
+from .winding import INSIDE_WINDING, Windings
 
 manifold3d: Any = lazy_module("manifold3d", "unions of bodies")
 
@@ -227,7 +229,8 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
     points, faces = indexed(triangles)
     if not len(faces) or (edge_table(faces).balance != 0).any():
         return False
-    own_windings, wrong_area = Windings(triangles), 0.0
+    rest = without_common(triangles, windings.triangles)
+    further, wrong_area = WindingTree.of(rest) if len(rest) else None, 0.0
     for chain, halvings in ((triangles, 0), (windings.triangles, 2)):
         chosen = _spread(len(chain))
         checked, widths = chain[chosen], tolerances(*indexed(chain), SAME_POINT)[chosen]
@@ -236,12 +239,27 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
         wrong = np.arange(len(checked))
         for multiple in TOLERANCES:
             rows, points_beside = _beside(checked[wrong], multiple * widths[wrong])
-            differ = np.abs(own_windings.numbers(points_beside) - windings.inside(points_beside)) > 0.5
+            numbers = windings.numbers(points_beside)
+            own_numbers = numbers + further.numbers(points_beside) if further else numbers
+            differ = np.abs(own_numbers - (numbers > INSIDE_WINDING)) > 0.5
             wrong = wrong[rows[differ.reshape(2, -1).any(axis=0)]]
         wrong_area += float(face_areas(checked[wrong]).sum()) * len(chain) / len(chosen)
     corners = triangles - points.mean(axis=0)
     volume = float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners))) / 3.0
     return wrong_area**1.5 / (6.0 * np.sqrt(np.pi)) <= WRONG_VOLUME * volume
+
+
+def without_common(triangles: Floats, others: Floats) -> Floats:
+    """Return (k, 3, 3) triangles, followed by others reversed, without those that are in both up to the last bit.
+
+    Their winding numbers are the differences of those of the two.
+    """
+    both = np.concatenate([triangles, others])
+    corners = same_positions(both.reshape(-1, 3)).reshape(-1, 3)
+    around = (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3  # the corner to begin with does not matter
+    numbers, first = distinct_rows(np.take_along_axis(corners, around, axis=1))
+    counts = np.bincount(numbers[: len(triangles)], minlength=len(first))
+    return directed(both[first], counts - np.bincount(numbers[len(triangles) :], minlength=len(first)))
 
 
 def _beside(triangles: Floats, steps: Floats) -> tuple[Ints, Floats]:
