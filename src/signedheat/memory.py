@@ -42,18 +42,20 @@ def libraries() -> int:
     return BYTES_IMPORTED if "numba" in sys.modules else BYTES_UNLOADED
 
 
-def refuse_beyond_memory(what: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]) -> None:
+def refuse_beyond_memory(
+    problem: str, count: int, estimate: Callable[[int], float], remedy: Callable[[int], str]
+) -> None:
     """Raise `MemoryLimitError` if there is not enough memory for `count` elements.
 
     ``estimate(count)`` returns the bytes that so many elements need. ``remedy(count)`` returns a text for the number of
-    elements that would fit. The message begins with `what`, a noun such as "the grid".
+    elements that would fit. The message begins with `problem`, a noun such as "the grid".
     """
     available = available_memory()
     needed = estimate(count) + libraries()
     if available is None or needed <= available:
         return
     raise MemoryLimitError(
-        f"{what} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
+        f"{problem} needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free",
         remedy=remedy(fitting_count(count, estimate, (available - libraries()) / REMEDY_MARGIN)),
     )
 

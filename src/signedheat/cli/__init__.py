@@ -115,9 +115,9 @@ def _one_line(error: BaseException) -> str:
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next
-    place = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else "nowhere"
+    position = f"{Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno}" if trace else "nowhere"
     about = printable(" ".join(f"{type(error).__name__}: {error}".split()))
     return (
-        f"this is a bug in signedheat {__version__} ({about:.200}; {place}), not your mistake: please report it, with "
-        "the command and what it prints when SIGNEDHEAT_TRACEBACK=1 is set"
+        f"this is a bug in signedheat {__version__} ({about:.200}; {position}), not your mistake: please report it, "
+        "with the command and what it prints when SIGNEDHEAT_TRACEBACK=1 is set"
     )

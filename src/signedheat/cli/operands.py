@@ -362,28 +362,28 @@ def ensure_surface_writable(path: str, planar: bool = False) -> None:
 
 
 def save_level(
-    what: Any, path: str, image: sh.io.LabelImage | None = None, field: sh.Field[sh.Grid] | None = None
+    level_set: Any, path: str, image: sh.io.LabelImage | None = None, field: sh.Field[sh.Grid] | None = None
 ) -> None:
     """Write a level set, which is a surface in space or polylines in the plane.
 
     A surface from an image is mapped to the world. If its field has a confidence and the format supports it, the
     confidence at each vertex is written, too.
     """
-    if isinstance(what, list):
-        return sh.io.write_polylines(what, path)
-    placed = what if image is None else image.to_world(what)
+    if isinstance(level_set, list):
+        return sh.io.write_polylines(level_set, path)
+    placed = level_set if image is None else image.to_world(level_set)
     if field is not None and field.confidence is not None and extension(path) in VALUE_FORMATS:
-        save_with_values(placed, path, CONFIDENCE, field.confidence_at(what.vertices))
+        save_with_values(placed, path, CONFIDENCE, field.confidence_at(level_set.vertices))
     else:
         sh.save(placed, path)
 
 
-def sizes_of(what: Any) -> dict[str, Any]:
+def sizes_of(level_set: Any) -> dict[str, Any]:
     """Return numbers of vertices and faces of a surface, or the number and length of polylines in the plane."""
-    if isinstance(what, list):
-        closed = sum(line.closed for line in what)
-        return {"lines": len(what), "closed": closed, "length": float(sum(line.length for line in what))}
-    return {"vertices": what.n_vertices, "faces": what.n_faces}
+    if isinstance(level_set, list):
+        closed = sum(line.closed for line in level_set)
+        return {"lines": len(level_set), "closed": closed, "length": float(sum(line.length for line in level_set))}
+    return {"vertices": level_set.n_vertices, "faces": level_set.n_faces}
 
 
 def output_names(output: str, distances: list[float]) -> list[str]:

@@ -248,10 +248,10 @@ def verdict_of_solid(solid: sh.Solid) -> str:
     """
     areas = face_areas(solid.triangles)
     made, sheets = (areas[chosen].sum() / areas.sum() for chosen in (solid.origins < 0, ~solid.bounding))
-    said = ["closed" if solid.bounding.any() else "sheets that bound nothing"]
-    said += [f"{percent(made)} of its area completed"] if made else []
-    said += [f"{percent(sheets)} of it sheets"] if sheets and solid.bounding.any() else []
-    return f"a solid: {', '.join(said)}; distance to it is exact"
+    phrases = ["closed" if solid.bounding.any() else "sheets that bound nothing"]
+    phrases += [f"{percent(made)} of its area completed"] if made else []
+    phrases += [f"{percent(sheets)} of it sheets"] if sheets and solid.bounding.any() else []
+    return f"a solid: {', '.join(phrases)}; distance to it is exact"
 
 
 def orientation_text(oriented: Orientation) -> str:
@@ -364,8 +364,8 @@ def _width_rows(widths: Widths) -> dict[str, str]:
         if low is not None:
             rows[name] = f"{low:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
     if widths.thinnest is not None and widths.thinnest_place is not None:
-        place = ", ".join(f"{x:.4g}" for x in widths.thinnest_place)
-        rows["thinnest place"] = f"{widths.thinnest:.4g} at ({place})"
+        point = ", ".join(f"{x:.4g}" for x in widths.thinnest_place)
+        rows["thinnest place"] = f"{widths.thinnest:.4g} at ({point})"
     if widths.spacing is not None:
         rows["spacing they need"] = f"{widths.spacing:.4g}"
     return rows

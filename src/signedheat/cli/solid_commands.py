@@ -161,13 +161,13 @@ def offset(arguments: Namespace) -> Summary:
     shape, field = shapes.shape_and_field(arguments, image, max(map(abs, arguments.distances)))
     with shapes.prefix_errors(arguments.shape):
         surfaces = [field.offset(distance) for distance in arguments.distances]
-    for what, path in zip(surfaces, outputs, strict=True):
-        shapes.save_level(what, path, image, field)
+    for surface, path in zip(surfaces, outputs, strict=True):
+        shapes.save_level(surface, path, image, field)
     if arguments.preview:
         sh.view.save_slices(field, arguments.preview, shape, arguments.distances)
     written = [
-        {"distance": distance, "output": path, **shapes.sizes_of(what)}
-        for distance, path, what in zip(arguments.distances, outputs, surfaces, strict=True)
+        {"distance": distance, "output": path, **shapes.sizes_of(surface)}
+        for distance, path, surface in zip(arguments.distances, outputs, surfaces, strict=True)
     ]
     unit = shapes.unit_in_use(arguments, arguments.shape)
     kind = f"{{lines:line}} ({{closed}} closed), length {{length:.6g}}{shapes.unit_suffix(unit)}"

@@ -33,41 +33,41 @@ def before(keys: Floats, a: int, b: int) -> bool:
 @compiled
 def push(queue: Queue, item: int, key: float) -> None:
     """Put an item into the queue with a key, or lower its key if it is in the queue with a larger one."""
-    items, places, keys, size = queue
-    place = places[item]
-    if place < 0:
-        place = size[0]
+    items, positions, keys, size = queue
+    position = positions[item]
+    if position < 0:
+        position = size[0]
         size[0] += 1
     elif key >= keys[item]:
         return
     keys[item] = key
-    while place > 0:
-        above = items[(place - 1) // 2]
+    while position > 0:
+        above = items[(position - 1) // 2]
         if before(keys, above, item):
             break
-        items[place], places[above] = above, place
-        place = (place - 1) // 2
-    items[place], places[item] = item, place
+        items[position], positions[above] = above, position
+        position = (position - 1) // 2
+    items[position], positions[item] = item, position
 
 
 @compiled
 def pop(queue: Queue) -> int:
     """Remove the item with the smallest key, and return it."""
-    items, places, keys, size = queue
+    items, positions, keys, size = queue
     first = items[0]
-    places[first] = -1
+    positions[first] = -1
     size[0] -= 1
     n = size[0]
     if n > 0:
-        last, place = items[n], 0
-        while 2 * place + 1 < n:
-            below = 2 * place + 1
+        last, position = items[n], 0
+        while 2 * position + 1 < n:
+            below = 2 * position + 1
             if below + 1 < n and before(keys, items[below + 1], items[below]):
                 below += 1
             if before(keys, last, items[below]):
                 break
-            items[place] = items[below]
-            places[items[place]] = place
-            place = below
-        items[place], places[last] = last, place
+            items[position] = items[below]
+            positions[items[position]] = position
+            position = below
+        items[position], positions[last] = last, position
     return int(first)

@@ -89,7 +89,7 @@ def _trace(
     shares.pop()
     while steps > 0:
         steps -= 1
-        best, kind, face, k, place = np.inf, DONE, 0, 0, 0j
+        best, kind, face, k, position = np.inf, DONE, 0, 0, 0j
         for i in range(len(at_faces)):
             f, x = at_faces[i], at_points[i]
             for s in range(np.searchsorted(sources.faces, f), np.searchsorted(sources.faces, f, side="right")):
@@ -98,12 +98,12 @@ def _trace(
                 share = ((x - sources.starts[s]) * way.conjugate()).real / square if square > 0.0 else 0.0
                 foot = sources.starts[s] + min(max(share, 0.0), 1.0) * way
                 if abs(x - foot) < best:
-                    best, kind, face, place = abs(x - foot), AT_SOURCE, f, foot
+                    best, kind, face, position = abs(x - foot), AT_SOURCE, f, foot
             for c in range(3):
                 v = faces.vertices[f, c]
                 away = search.distance[v] + abs(x - faces.positions[f, c])
                 if v != vertex and away < best * (1.0 - 1e-13):
-                    best, kind, face, k, place = away, AT_VERTEX, f, c, faces.positions[f, c]
+                    best, kind, face, k, position = away, AT_VERTEX, f, c, faces.positions[f, c]
             for side in range(3):
                 passed = faces.vertices[f, side] == vertex or faces.vertices[f, (side + 1) % 3] == vertex
                 if passed or faces.edges[f, side] == edge:
@@ -111,8 +111,8 @@ def _trace(
                 away, share = _through_side(faces, search, 3 * f + side, x)
                 if away < best * (1.0 - 1e-13):
                     best, kind, face, k = away, ACROSS, f, side
-                    place = faces.positions[f, side]
-                    place += share * (faces.positions[f, (side + 1) % 3] - place)
+                    position = faces.positions[f, side]
+                    position += share * (faces.positions[f, (side + 1) % 3] - position)
                     if share < AT_END or share > 1.0 - AT_END:
                         kind, k = AT_VERTEX, (side + np.int64(share > 0.5)) % 3
         if vertex >= 0 and search.distance[vertex] <= best * (1.0 + 1e-13) and search.distance[vertex] == 0.0:
@@ -130,7 +130,7 @@ def _trace(
             elif kind == ACROSS and c == (k + 2) % 3:
                 shares.append(0.0)
             else:
-                a, b = corners[(c + 1) % 3] - place, corners[(c + 2) % 3] - place
+                a, b = corners[(c + 1) % 3] - position, corners[(c + 2) % 3] - position
                 shares.append(max(cross(a, b) / whole, 0.0))
         if kind == AT_SOURCE:
             return total, np.array(path_faces), np.array(shares).reshape(-1, 3)
@@ -142,7 +142,7 @@ def _trace(
                 at_points[i] = faces.positions[around[i] // 3, around[i] % 3]
         else:
             edge, vertex = faces.edges[face, k], np.int64(-1)
-            share = abs(place - faces.positions[face, k]) / faces.lengths[edge]
+            share = abs(position - faces.positions[face, k]) / faces.lengths[edge]
             share = share if faces.forward[face, k] else 1.0 - share
             halfedges = faces.halfedges[faces.first_halfedge[edge] : faces.first_halfedge[edge + 1]]
             at_faces, at_points = halfedges // 3, np.empty(len(halfedges), np.complex128)

@@ -163,15 +163,15 @@ def charge(bytes: float = 0, elements: int = 0, points: int = 0) -> None:
             remedy="check that it is not damaged, or free some memory",
             path=current.path,
         )
-    for what, made, given, usual, error in (
+    for noun, made, given, usual, error in (
         ("elements", current.elements, current.budget.elements, MOST_ELEMENTS, FileFormatError),
         ("points", current.points, current.budget.points, MOST_POINTS, MemoryLimitError),
     ):
         most = usual + current.size if given is None else given
         if made > most:
             raise error(
-                f"its parts are used again and again: that makes {made:.4g} {what}, more than {most:.4g}",
-                remedy=f"check that it is not damaged, or read it with sh.io.Budget({what}={made})",
+                f"its parts are used again and again: that makes {made:.4g} {noun}, more than {most:.4g}",
+                remedy=f"check that it is not damaged, or read it with sh.io.Budget({noun}={made})",
                 path=current.path,
             )
     seconds = current.seconds(LEAST_SECONDS)

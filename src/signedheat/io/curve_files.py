@@ -105,8 +105,8 @@ def refuse_gaps(sources: Sequence[CurveOrPoints], mesh: TriangleMesh) -> None:
     """Raise a `SourceError` if consecutive points of a curve share no face."""
     for number, source in enumerate(sources):
         if isinstance(source, Curve):
-            places = locate_points(mesh.intrinsic, source.faces, source.barycentric, f"curve {number}: point")
-            apart = gaps(mesh.intrinsic, places, source.closed)
+            located = locate_points(mesh.intrinsic, source.faces, source.barycentric, f"curve {number}: point")
+            apart = gaps(mesh.intrinsic, located, source.closed)
             if len(apart):
                 raise SourceError(
                     f"curve {number}: points {apart[0]} and {(apart[0] + 1) % source.n_points} share no face, "
@@ -223,8 +223,8 @@ def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple
         run = [*range(len(nodes))] + [0] * (len(segments) == len(nodes))
         return [Group(kind, [nodes[i] for i in run])]
     rank: dict[Node, int] = {}
-    place = np.array([rank.setdefault(node, len(rank)) for node in nodes])
-    ends = place[np.array([s for s in segments if place[s[0]] != place[s[1]]], dtype=np.int64).reshape(-1, 2)]
+    numbers = np.array([rank.setdefault(node, len(rank)) for node in nodes])
+    ends = numbers[np.array([s for s in segments if numbers[s[0]] != numbers[s[1]]], dtype=np.int64).reshape(-1, 2)]
     distinct = list(rank)
     groups = []
     for order, backwards, _ in assemble_polylines(ends[:, 0], ends[:, 1], directed=kind == SIGNED):

@@ -299,35 +299,35 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
 def _subpaths(data: str) -> Iterator[tuple[Floats, bool]]:
     """Yield the (n, 2) points of each subpath of path data that has a length, and whether it is closed."""
     points: list[Complexes] = []
-    place = start = control = 0j
+    current = start = control = 0j
     before, closed = "", False
     for command, numbers in _steps(data):
-        name, origin = command.upper(), place if command.islower() else 0j
+        name, origin = command.upper(), current if command.islower() else 0j
         if name == "M" or (before == "Z" and name != "Z"):
             yield from _whole(points, closed)
-            start = place = origin + complex(*numbers) if name == "M" else start
+            start = current = origin + complex(*numbers) if name == "M" else start
             points, closed = [np.array([start])], False
         if not points:
             raise damaged(f"a path begins with '{command}', not with M")
         ends = [origin + complex(x, y) for x, y in zip(numbers[::2], numbers[1::2], strict=False)]
         if name == "Z":
-            closed, place = True, start
+            closed, current = True, start
         elif name in "HV":
-            across, along = (place.imag, origin.real) if name == "H" else (place.real, origin.imag)
-            place = complex(along + numbers[0], across) if name == "H" else complex(across, along + numbers[0])
-            points.append(np.array([place]))
+            across, along = (current.imag, origin.real) if name == "H" else (current.real, origin.imag)
+            current = complex(along + numbers[0], across) if name == "H" else complex(across, along + numbers[0])
+            points.append(np.array([current]))
         elif name == "L":
-            place = ends[0]
-            points.append(np.array([place]))
+            current = ends[0]
+            points.append(np.array([current]))
         elif name in "CSQT":
-            smooth = 2 * place - control if before and before in ("CS" if name in "CS" else "QT") else place
-            corners = [place, *([smooth] if name in "ST" else []), *ends]
+            smooth = 2 * current - control if before and before in ("CS" if name in "CS" else "QT") else current
+            corners = [current, *([smooth] if name in "ST" else []), *ends]
             points.append(_bezier(corners))
-            control, place = corners[-2], corners[-1]
+            control, current = corners[-2], corners[-1]
         elif name == "A":
             end = origin + complex(*numbers[5:])
-            points.append(_arc(place, end, *numbers[:5]))
-            place = end
+            points.append(_arc(current, end, *numbers[:5]))
+            current = end
         before = name
     yield from _whole(points, closed)
 

@@ -226,13 +226,13 @@ def _load_band(path: PathLike) -> Field[Band]:
         grid = made(Grid, arrays["origin"], arrays["spacing"], arrays["shape"])
         far = arrays["coarse_values"]
         coarse = made(Field, made(Grid, arrays["origin"], arrays["coarse_spacing"], far.shape), far)
-        places = arrays["places"]
-        if places.ndim != 2 or places.dtype.kind not in "iu" or places.shape[1] != len(grid.shape):
+        positions = arrays["places"]
+        if positions.ndim != 2 or positions.dtype.kind not in "iu" or positions.shape[1] != len(grid.shape):
             raise damaged("its blocks have no positions", element="places")
-        if len(places) and not ((places >= 0) & (places * BLOCK < grid.shape)).all():
+        if len(positions) and not ((positions >= 0) & (positions * BLOCK < grid.shape)).all():
             raise damaged("its blocks lie outside of the grid", element="places")
-        blocks = Blocks.of(places, grid.shape)
-        if not np.array_equal(blocks.places, places):
+        blocks = Blocks.of(positions, grid.shape)
+        if not np.array_equal(blocks.places, positions):
             raise damaged("its blocks are not in order", element="places")
         band = made(Band, grid, blocks, float(arrays["width"]))
         options = {"confidence": arrays.get(CONFIDENCE), "solid": _held_solid(path)}
@@ -295,10 +295,10 @@ def whole_values(field: Field[Band]) -> NDArray[np.float32]:
     """Return (nx, ny, nz) values of a field in a band, clipped to plus or minus the half width of the band."""
     grid, width = field.domain, np.float32(field.domain.width)
     counts = -(-np.array(grid.shape) // BLOCK)
-    places = np.argwhere(np.ones(counts, dtype=bool))
-    rows = field.domain.blocks.rows(places)
-    middles = np.minimum(places[rows < 0] * BLOCK + 0.5 * (BLOCK - 1), np.array(grid.shape) - 1)
-    parts = np.full((len(places), BLOCK, BLOCK, BLOCK), width, dtype=np.float32)
+    positions = np.argwhere(np.ones(counts, dtype=bool))
+    rows = field.domain.blocks.rows(positions)
+    middles = np.minimum(positions[rows < 0] * BLOCK + 0.5 * (BLOCK - 1), np.array(grid.shape) - 1)
+    parts = np.full((len(positions), BLOCK, BLOCK, BLOCK), width, dtype=np.float32)
     parts[rows < 0] *= np.where(field(grid.origin + middles * grid.spacing) < 0, -1, 1)[:, None, None, None]
     parts[rows >= 0] = np.clip(field.values[rows[rows >= 0]], -width, width)
     a, b, c = counts

@@ -192,16 +192,16 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
     return {keyword: rest for keyword, rest in lines.items() if rest}
 
 
-def _coordinates(rows: list[list[Any]], what: str) -> Floats:
+def _coordinates(rows: list[list[Any]], name: str) -> Floats:
     """Return (n, 3) coordinates on n lines of `_lines_by_keyword`; weights and colours after them are ignored.
 
-    `what` names them in messages.
+    `name` names them in messages.
     """
     short = next((k for k, row in enumerate(rows) if len(row) < 4), None)
     if short is not None:
-        cause = f"number {short} of the {what} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
+        cause = f"number {short} of the {name} has {len(rows[short]) - 1} coordinates instead of 3: it may be truncated"
         raise damaged(cause, element=f"number {short}")
-    return parsed_numbers([row[1:4] for row in rows], what).reshape(-1, 3)
+    return parsed_numbers([row[1:4] for row in rows], name).reshape(-1, 3)
 
 
 def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
@@ -238,7 +238,7 @@ def read_off(path: PathLike) -> Elements:
     if not rows or len(rows[0]) < 2:
         raise damaged("the numbers of vertices and faces are missing: it may be truncated")
     n_vertices, n_faces, *_ = (
-        integer(word, f"number of {what}") for word, what in zip(rows[0], ("vertices", "faces", "edges"), strict=False)
+        integer(word, f"number of {noun}") for word, noun in zip(rows[0], ("vertices", "faces", "edges"), strict=False)
     )
     lines = iter(rows[1:])
     vertex_rows = list(islice(_records(lines, lambda row: 3), n_vertices))

@@ -85,10 +85,10 @@ def step(path: str, deflection: float | None, fineness: float, angle: float) -> 
     walk = TopExp.TopExp_Explorer(shape, TopAbs.TopAbs_ShapeEnum.TopAbs_FACE)
     points, triangles = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)]
     while walk.More():
-        face, place = as_face(walk.Current()), TopLoc.TopLoc_Location()
-        mesh = BRep.BRep_Tool.Triangulation_s(face, place)
+        face, location = as_face(walk.Current()), TopLoc.TopLoc_Location()
+        mesh = BRep.BRep_Tool.Triangulation_s(face, location)
         n_points, n_triangles = (0, 0) if mesh is None else (mesh.NbNodes(), mesh.NbTriangles())
-        move = place.Transformation()
+        move = location.Transformation()
         nodes = (mesh.Node(k).Transformed(move) for k in range(1, n_points + 1))
         points.append(np.array([(node.X(), node.Y(), node.Z()) for node in nodes]).reshape(-1, 3))
         rows = (mesh.Triangle(k) for k in range(1, n_triangles + 1))

@@ -129,10 +129,10 @@ def _answer(stream: BinaryIO, left: float) -> dict[str, Any] | None:
     return values
 
 
-def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError:
+def _died(package: str, status: int, last_message: str, seconds: int) -> SignedHeatError:
     """Return the error for a parser that ended without an answer.
 
-    `status` is the exit status, or minus the number of the signal that ended it; `said` is its last message.
+    `status` is the exit status, or minus the number of the signal that ended it; `last_message` is its last message.
     """
     number = -status if status < 0 else 0
     name = Signals(number).name if number else f"status {status}"
@@ -142,7 +142,7 @@ def _died(package: str, status: int, said: str, seconds: int) -> SignedHeatError
     if name == "SIGXCPU":
         cause = f"{package} needs more than {seconds} s of processor time for it"
     else:
-        cause = f"{package} crashed on it ({name}{': ' if said else ''}{said:.200})"
+        cause = f"{package} crashed on it ({name}{': ' if last_message else ''}{last_message:.200})"
     return FileFormatError(cause, remedy="write it again, or in another format")
 
 

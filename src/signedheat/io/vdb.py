@@ -117,10 +117,10 @@ def _band(field: Field[Band]) -> _Tree:
     finite = ~np.isnan(field.values)
     values = np.where(finite, np.clip(field.values, -background, background), background)
 
-    def outside(places: Ints, size: int) -> NDArray[np.float32]:
-        middle = places + 0.5 * (size - 1)
+    def outside(voxels: Ints, size: int) -> NDArray[np.float32]:
+        middle = voxels + 0.5 * (size - 1)
         on_grid = (middle < np.array(grid.shape)).all(axis=1)
-        result = np.full(len(places), background, dtype=np.float32)
+        result = np.full(len(voxels), background, dtype=np.float32)
         inside = field(grid.origin + middle[on_grid] * grid.spacing) < 0
         result[np.flatnonzero(on_grid)[inside]] *= -1
         return result
@@ -142,8 +142,8 @@ def _whole(field: Field[Grid]) -> _Tree:
     values = values[np.ravel_multi_index(tuple(blocks.places.astype(np.int64).T), tuple(counts))]
     active = ~np.isnan(values)
 
-    def outside(places: Ints, size: int) -> NDArray[np.float32]:
-        return np.full(len(places), background, dtype=np.float32)
+    def outside(voxels: Ints, size: int) -> NDArray[np.float32]:
+        return np.full(len(voxels), background, dtype=np.float32)
 
     return _in_order(blocks, np.where(active, values, background), active, background, outside)
 
@@ -155,10 +155,10 @@ def _in_order(
 
     Values and activity are (n, 8, 8, 8) arrays in the order of `blocks`.
     """
-    places = BLOCK * blocks.places.astype(np.int64)
+    voxels = BLOCK * blocks.places.astype(np.int64)
     top, cube = CHILDREN_PER_EDGE[0] * VOXELS_PER_CHILD[0], VOXELS_PER_CHILD[0]
-    order = np.lexsort(np.concatenate([places // top, places // cube, places], axis=1).T[::-1])
-    return _Tree(background, places[order], values[order], active[order], outside)
+    order = np.lexsort(np.concatenate([voxels // top, voxels // cube, voxels], axis=1).T[::-1])
+    return _Tree(background, voxels[order], values[order], active[order], outside)
 
 
 def _write_file(
@@ -195,19 +195,19 @@ def _write_topology(file: BinaryIO, tree: _Tree, kind: np.dtype) -> None:
     masks = iter(tree.active)
     for top, cubes in cubes_of.items():
         file.write(struct.pack("<iii", *top) + _node(np.array(top), 0, cubes, tree.outside, kind))
-        for place in cubes:
-            blocks = blocks_of[tuple(place.tolist())]
-            file.write(_node(place, 1, blocks, tree.outside, kind))
+        for first_voxel in cubes:
+            blocks = blocks_of[tuple(first_voxel.tolist())]
+            file.write(_node(first_voxel, 1, blocks, tree.outside, kind))
             for _ in blocks:
                 file.write(_mask(next(masks).ravel()))
 
 
-def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
+def _node(first_voxel: Ints, level: int, children: Ints, outside: Outside, kind: np.dtype) -> bytes:
     """Return a node as bytes: masks of cubes that have children and that are active (none), and values of the cubes.
 
     Parameters
     ----------
-    place : (3,) int
+    first_voxel : (3,) int
         The first voxel of the node.
     level : int
         0 for a top node, whose children are cubes of blocks, and 1 for such a cube, whose children are blocks.
@@ -219,9 +219,9 @@ def _node(place: Ints, level: int, children: Ints, outside: Outside, kind: np.dt
         The type of the values in the file.
     """
     size, shape = VOXELS_PER_CHILD[level], (CHILDREN_PER_EDGE[level],) * 3
-    cubes = place + size * np.indices(shape).reshape(3, -1).T
+    cubes = first_voxel + size * np.indices(shape).reshape(3, -1).T
     has_child = np.zeros(shape, dtype=bool)
-    has_child[tuple((children - place).T // size)] = True
+    has_child[tuple((children - first_voxel).T // size)] = True
     values = np.where(has_child.ravel(), np.float32(0), outside(cubes, size))
     return _mask(has_child) + _mask(np.zeros(shape, dtype=bool)) + _packed(values, kind)
 
@@ -265,12 +265,12 @@ def _packed(values: NDArray[np.floating], kind: np.dtype) -> bytes:
     return bytes([ALL_VALUES_BYTE]) + size + (packed if is_shorter else data)
 
 
-def _by_parent(places: Ints, size: int) -> dict[tuple[int, ...], Ints]:
+def _by_parent(voxels: Ints, size: int) -> dict[tuple[int, ...], Ints]:
     """Return the sorted distinct first voxels of nodes, (k, 3), by the first voxel of their parent.
 
     Parents have `size` voxels along each edge.
     """
-    nodes = np.unique(places, axis=0)
+    nodes = np.unique(voxels, axis=0)
     parents, rows = np.unique(nodes // size * size, axis=0, return_inverse=True)
     order = np.argsort(rows.ravel(), kind="stable")
     parts = np.split(nodes[order], np.cumsum(np.bincount(rows.ravel()))[:-1])

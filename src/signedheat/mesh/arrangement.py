@@ -240,7 +240,7 @@ def _with_crossings(
     tree = BoxTree.around(corners)
     within = slacks[records.faces]
     starts, near = tree.meeting(corners, within)
-    touching, crossing, places = _cross(points, records.faces, records.lines, ends, starts, near, within)
+    touching, crossing, positions = _cross(points, records.faces, records.lines, ends, starts, near, within)
     within = within[crossing[:, 0]]
     first, second = records.lines[crossing].T
     n_edges = len(lines.ends) - len(lines.sides)
@@ -251,7 +251,7 @@ def _with_crossings(
     single = twice.sum(axis=1) == 1
     names[np.flatnonzero(three)[single]] = of_faces[single][~twice[single]].reshape(-1, 3) + len(lines.ends)
     every = np.ones(len(names), dtype=bool)
-    points, reaches, ids = _with_new(points, reaches, names, places, within, every, first)
+    points, reaches, ids = _with_new(points, reaches, names, positions, within, every, first)
     lines = lines._replace(on=Incidence.of(lines.on, tuple(touching.T), (first, ids), (second, ids)))
     rename = _welded(points, np.concatenate([busy, lines.on.points, lines.within.points, lines.ends.ravel()]), reaches)
     records = records._replace(tails=rename[records.tails], heads=rename[records.heads])
@@ -467,10 +467,10 @@ def _meetings(
     A meeting is a row of its kind and the ids of two elements: ON_EDGE, edge and vertex; IN_FACE, face and vertex;
     TWO_EDGES and both edges, the smaller id first; EDGE_AND_FACE, edge and face.
     """
-    meetings, places, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]
+    meetings, positions, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]
     touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
     on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
-    normals, place = np.empty((2, 3)), np.empty(3)
+    normals, position = np.empty((2, 3)), np.empty(3)
     for r in range(len(pairs)):
         slack = min(slacks[pairs[r, 0]], slacks[pairs[r, 1]])
         touch[:], on[:], hit[:], heights[:] = False, False, False, 0.0
@@ -486,14 +486,14 @@ def _meetings(
                 for k in range(3):
                     if _is_on(points, v, faces[g, k], faces[g, (k + 1) % 3], slack):
                         meetings.append((ON_EDGE, face_edges[g, k], v))
-                        places.append((0.0, 0.0, 0.0))
+                        positions.append((0.0, 0.0, 0.0))
                         touch[s, i, k], on[s, i], hit[1 - s, k] = True, True, True
                 for d in range(3):
                     heights[s, i] += normals[1 - s, d] * (points[v, d] - points[faces[g, 0], d])
                 flat = not on[s, i] and abs(heights[s, i]) <= slack
                 if flat and _is_over(points, points[v], faces[g], normals[1 - s]):
                     meetings.append((IN_FACE, g, v))
-                    places.append((0.0, 0.0, 0.0))
+                    positions.append((0.0, 0.0, 0.0))
                     on[s, i] = True
         f, g = pairs[r, 0], pairs[r, 1]
         for i in range(3):
@@ -506,10 +506,10 @@ def _meetings(
                     continue
                 if touch[0, i, k] or touch[0, (i + 1) % 3, k] or touch[1, k, i] or touch[1, (k + 1) % 3, i]:
                     continue
-                off = _closest(points, a, b, c, d, place) if e < h else _closest(points, c, d, a, b, place)
+                off = _closest(points, a, b, c, d, position) if e < h else _closest(points, c, d, a, b, position)
                 if off <= slack:
                     meetings.append((TWO_EDGES, min(e, h), max(e, h)))
-                    places.append((place[0], place[1], place[2]))
+                    positions.append((position[0], position[1], position[2]))
                     hit[0, i], hit[1, k] = True, True
         for s in range(2):
             g = pairs[r, 1 - s]
@@ -520,13 +520,13 @@ def _meetings(
                     continue
                 v, w = faces[pairs[r, s], i], faces[pairs[r, s], k]
                 for d in range(3):
-                    place[d] = points[v, d] + low / (low - high) * (points[w, d] - points[v, d])
-                if _is_over(points, place, faces[g], normals[1 - s]):
+                    position[d] = points[v, d] + low / (low - high) * (points[w, d] - points[v, d])
+                if _is_over(points, position, faces[g], normals[1 - s]):
                     meetings.append((EDGE_AND_FACE, face_edges[pairs[r, s], i], g))
-                    places.append((place[0], place[1], place[2]))
+                    positions.append((position[0], position[1], position[2]))
         for _ in range(len(meetings) - len(within)):
             within.append(slack)
-    return np.array(meetings)[1:], np.array(places)[1:], np.array(within)[1:]
+    return np.array(meetings)[1:], np.array(positions)[1:], np.array(within)[1:]
 
 
 class Chains(NamedTuple):
@@ -554,8 +554,8 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
     if p == chains.ends[line, 0] or p == chains.ends[line, 1]:
         return True
     on_line = chains.points[chains.starts[line] : chains.starts[line + 1]]
-    place = np.searchsorted(on_line, p)
-    return bool(place < len(on_line) and on_line[place] == p)
+    index = np.searchsorted(on_line, p)
+    return bool(index < len(on_line) and on_line[index] == p)
 
 
 @compiled
@@ -651,8 +651,8 @@ def _cross(
     that may meet part r. Returns (t, 2) pairs of a line and a point on it, (c, 2) pairs of parts that cross, and (c, 3)
     positions of the crossings.
     """
-    touching, crossing, places = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
-    place = np.empty(3)
+    touching, crossing, positions = [(0, 0)], [(0, 0)], [(0.0, 0.0, 0.0)]
+    position = np.empty(3)
     for r in range(len(faces)):
         for s in near[starts[r] : starts[r + 1]]:
             if s <= r or faces[s] != faces[r] or lines[s] == lines[r]:
@@ -666,7 +666,7 @@ def _cross(
                     elif _is_on(points, v, a, b, slacks[r]):
                         touching.append((lines[second], v))
                         met = True
-            if not met and _closest(points, ends[r, 0], ends[r, 1], ends[s, 0], ends[s, 1], place) < np.inf:
+            if not met and _closest(points, ends[r, 0], ends[r, 1], ends[s, 0], ends[s, 1], position) < np.inf:
                 crossing.append((r, s))
-                places.append((place[0], place[1], place[2]))
-    return np.array(touching)[1:], np.array(crossing)[1:], np.array(places)[1:]
+                positions.append((position[0], position[1], position[2]))
+    return np.array(touching)[1:], np.array(crossing)[1:], np.array(positions)[1:]

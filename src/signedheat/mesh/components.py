@@ -81,8 +81,8 @@ def places_among(ordered: NDArray[np.integer], keys: NDArray[np.integer]) -> Int
     """Return (k,) the index of each key in a sorted array, −1 if it is not in it."""
     if not len(ordered):
         return np.full(len(keys), -1)
-    places = np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)
-    return np.where(ordered[places] == keys, places, -1)
+    indices = np.minimum(np.searchsorted(ordered, keys), len(ordered) - 1)
+    return np.where(ordered[indices] == keys, indices, -1)
 
 
 def numbered(counts: Ints) -> tuple[Ints, Ints]:
@@ -119,8 +119,8 @@ def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
         starts[group + 1] += 1
     for group in range(n):
         starts[group + 1] += starts[group]
-    places, members = starts[:-1].copy(), np.empty(len(groups), dtype=np.int64)
+    positions, members = starts[:-1].copy(), np.empty(len(groups), dtype=np.int64)
     for member, group in enumerate(groups):
-        members[places[group]] = member
-        places[group] += 1
+        members[positions[group]] = member
+        positions[group] += 1
     return starts, members

@@ -158,10 +158,10 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     faces, vectors = merged.faces, merged.vectors
     node, before, after = _nodes_between(merged)
     run, first, last = _runs(len(faces), before, after)
-    places = np.stack([barycentric_in(triangles, faces, merged.nodes[end]) for end in merged.ends.T], axis=1)
-    places = (places * triangles.corner_positions[faces, None]).sum(axis=2)
-    begin, end = places[first[run[before]], 0], places[last[run[before]], 1]
-    off = np.abs((np.conj(end - begin) * (places[before, 1] - begin)).imag)
+    positions = np.stack([barycentric_in(triangles, faces, merged.nodes[end]) for end in merged.ends.T], axis=1)
+    positions = (positions * triangles.corner_positions[faces, None]).sum(axis=2)
+    begin, end = positions[first[run[before]], 0], positions[last[run[before]], 1]
+    off = np.abs((np.conj(end - begin) * (positions[before, 1] - begin)).imag)
     bent = off > ZERO_COORDINATE * triangles.edge_lengths[faces[before]].max(axis=1) * np.abs(end - begin)
     bent &= merged.edges[before] < 0
     straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
@@ -323,5 +323,5 @@ def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors:
 def interpolation_at(triangles: IntrinsicMesh, located: LocatedPoints) -> csr_matrix:
     """Return the sparse (n, n_vertices) matrix that interpolates values at vertices at n points (rows of A, Eq. 14)."""
     rows, corners = np.nonzero(located.barycentric > 0)
-    places = rows, triangles.corner_vertices[located.faces[rows], corners]
-    return csr_matrix((located.barycentric[rows, corners], places), shape=(len(located), triangles.n_vertices))
+    entries = rows, triangles.corner_vertices[located.faces[rows], corners]
+    return csr_matrix((located.barycentric[rows, corners], entries), shape=(len(located), triangles.n_vertices))

@@ -101,8 +101,8 @@ def crossed_cells(crossings: Crossings, shape: tuple[int, ...]) -> CrossedCells:
     sides = (4 * np.arange(3)[:, None] + CELLS_AROUND @ [2, 1]).astype(np.int8)[crossings.axes]
     edges = np.full((len(cells), 12), -1, dtype=np.int32)
     edges[rows, sides] = np.arange(len(rows))[:, None]
-    places = np.stack(np.unravel_index(cells, shape), axis=1, dtype=np.int32, casting="same_kind")
-    return CrossedCells(places, edges, rows, sides)
+    positions = np.stack(np.unravel_index(cells, shape), axis=1, dtype=np.int32, casting="same_kind")
+    return CrossedCells(positions, edges, rows, sides)
 
 
 def dual_cells(
@@ -112,11 +112,11 @@ def dual_cells(
 
     ``inside(points)`` returns (n,) bool, true where (n, 3) points, in coordinates of nodes, are inside.
     """
-    places, edges, rows, sides = around
-    ways = np.zeros((len(places), 6), dtype=np.bool_)
+    positions, edges, rows, sides = around
+    ways = np.zeros((len(positions), 6), dtype=np.bool_)
     cells, faces = np.nonzero(_crossed_faces(edges) == 4)
     across, side = faces // 2, faces % 2
-    first = places[cells]
+    first = positions[cells]
     first[np.arange(len(cells)), across] += side
     keys = np.ravel_multi_index(tuple(first.T), shape) * 3 + across
     order = np.argsort(keys, kind="stable").reshape(-1, 2)  # the two cells at each face
@@ -132,11 +132,11 @@ def dual_cells(
         if not len(double):
             break
         # one face of a cell at a time: each change divides the pieces of both cells, but two may join them again
-        first_of = np.full(len(places), len(order))
+        first_of = np.full(len(positions), len(order))
         np.minimum.at(first_of, cells[order[double]], double[:, None])
         way[double[(first_of[cells[order[double]]] == double[:, None]).all(axis=1)]] ^= True
-    owners = np.repeat(np.arange(len(places), dtype=np.int32), counts)
-    return DualCells(places, edges, pieces, owners, pieces[rows, sides])
+    owners = np.repeat(np.arange(len(positions), dtype=np.int32), counts)
+    return DualCells(positions, edges, pieces, owners, pieces[rows, sides])
 
 
 def open_cells(edges: NDArray[np.int32]) -> Ints:

@@ -114,13 +114,13 @@ def _partners(starts: Ints, forward: Bools, labels: Ints) -> Ints:
                 least, begin = level, k + 1
         waiting, head, tail = np.empty(count, dtype=np.int64), 0, 0
         for k in range(count):
-            place = (begin + k) % count
-            if not rest[place]:
+            index = (begin + k) % count
+            if not rest[index]:
                 continue
-            if forward[first + place]:
-                partners[first + place] = waiting[head]
+            if forward[first + index]:
+                partners[first + index] = waiting[head]
                 head += 1
             else:
-                waiting[tail] = first + place
+                waiting[tail] = first + index
                 tail += 1
     return partners

@@ -167,8 +167,8 @@ def triangulate_polygon(points: Floats, n: int) -> Ints | None:
     around = 0.5 * (points.min(axis=0) + points.max(axis=0)) + size * AROUND
     # in rounds of about twice as many points each, so that rows of points take no time that is quadratic
     order = np.argsort(-np.random.default_rng(0).geometric(0.5, len(points)), kind="stable")
-    place = np.argsort(order)
-    sides = 3 + np.stack([place[:n], np.roll(place[:n], -1)], axis=1)
+    rank = np.argsort(order)
+    sides = 3 + np.stack([rank[:n], np.roll(rank[:n], -1)], axis=1)
     triangles, across = _triangulate_apart(np.concatenate([around, points[order]]), np.array([1, 2, 3]), sides)
     if not len(triangles):
         return None

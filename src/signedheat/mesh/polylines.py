@@ -135,8 +135,8 @@ def _united(outlines: list[Floats]) -> Any:
     runs_back = np.array([_doubled_area(outline) < 0 for outline in outlines])
     areas, outermost = np.array([part.area() for part in parts]), np.arange(len(parts))
     by_size = np.argsort(-areas, kind="stable")
-    for place, inner in enumerate(by_size) if runs_back.any() and not runs_back.all() else ():
-        larger = by_size[:place][areas[by_size[:place]] > (1 + AREA_ROUNDING) * areas[inner]]
+    for index, inner in enumerate(by_size) if runs_back.any() and not runs_back.all() else ():
+        larger = by_size[:index][areas[by_size[:index]] > (1 + AREA_ROUNDING) * areas[inner]]
         around = ((boxes[larger, 0] <= boxes[inner, 0]) & (boxes[larger, 1] >= boxes[inner, 1])).all(axis=1)
         for outer in larger[around]:
             if (parts[inner] - parts[outer]).area() <= AREA_ROUNDING * areas[inner]:

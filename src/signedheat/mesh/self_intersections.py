@@ -111,8 +111,8 @@ def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
     middles = 0.5 * (lower + upper)
     if not (hubs >= 0).any():
         return np.argsort(morton_codes(middles), kind="stable")
-    places = np.where((hubs >= 0)[:, None], vertices[hubs], middles)
-    return np.lexsort((morton_codes(middles), hubs, morton_codes(places)))
+    positions = np.where((hubs >= 0)[:, None], vertices[hubs], middles)
+    return np.lexsort((morton_codes(middles), hubs, morton_codes(positions)))
 
 
 def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:

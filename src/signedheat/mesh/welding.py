@@ -326,17 +326,17 @@ def _same_rows(rows: Ints) -> Ints:
         for d in range(width):
             key = (key ^ np.uint64(rows[i, d])) * np.uint64(0x9E3779B97F4A7C15)
             key ^= key >> np.uint64(29)
-        place = key & mask
+        slot = key & mask
         while True:
-            row = table[place]
+            row = table[slot]
             same = row >= 0
             for d in range(width):
                 same = same and rows[i, d] == rows[row, d]
             if same or row < 0:
                 break
-            place = (place + np.uint64(1)) & mask
+            slot = (slot + np.uint64(1)) & mask
         if row < 0:
-            table[place] = row = i
+            table[slot] = row = i
         result[i] = row
     return result
 

@@ -289,14 +289,14 @@ def _feet(
 ) -> tuple[Floats, Floats, NDArray[np.int8], NDArray[np.float32], Bools]:
     """Compute the fields of `NearestFaces` from `distances` on, for the nearest face of each of (n, 3) points."""
     n = len(points)
-    distances, places, kinds = np.empty(n), np.empty((n, 3)), np.empty(n, dtype=np.int8)
+    distances, feet, kinds = np.empty(n), np.empty((n, 3)), np.empty(n, dtype=np.int8)
     cosines, regular = np.empty(n, dtype=np.float32), np.empty(n, dtype=np.bool_)
     for p in range(n):
         face, x, y, z = np.int64(faces[p]), points[p, 0], points[p, 1], points[p, 2]
         square, kinds[p], fx, fy, fz = foot_on_triangle(features.rows, face, x, y, z)
-        distances[p], places[p, 0], places[p, 1], places[p, 2] = np.sqrt(square), fx, fy, fz
+        distances[p], feet[p, 0], feet[p, 1], feet[p, 2] = np.sqrt(square), fx, fy, fz
         cosines[p], regular[p] = _cosine_to_normal(features, face, kinds[p], x - fx, y - fy, z - fz)
-    return distances, places, kinds, cosines, regular
+    return distances, feet, kinds, cosines, regular
 
 
 @compiled

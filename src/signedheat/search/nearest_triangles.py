@@ -111,10 +111,10 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
 
 
 @compiled
-def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Floats) -> None:
+def away_from_triangle(rows: Floats, f: int, points: Floats, at: int, out: Floats) -> None:
     """Write squared distances of points to triangle f, and the vectors from their feet, to ``out[at]``, (4, n).
 
-    `places` are the coordinates of the points, (3, n). This is `foot_on_triangle` without branches. The compiler
+    `points` are the coordinates of the points, (3, n). This is `foot_on_triangle` without branches. The compiler
     vectorises the loop over points if it does not know their number.
     """
     ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
@@ -123,8 +123,8 @@ def away_from_triangle(rows: Floats, f: int, places: Floats, at: int, out: Float
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     first, second, third = rows[f, 9], rows[f, 12], rows[f, 15]
     c, d, g, h = rows[f, 10], rows[f, 11], rows[f, 13], rows[f, 14]
-    for k in range(places.shape[1]):
-        x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
+    for k in range(points.shape[1]):
+        x, y, z = points[0, k] - ax, points[1, k] - ay, points[2, k] - az
         p, q = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz
         up = x * nx + y * ny + z * nz
         t = p if p > 0.0 else 0.0
@@ -187,10 +187,10 @@ def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Flo
     return weights
 
 
-def weights_in(triangles: Floats, places: Floats) -> Floats:
+def weights_in(triangles: Floats, points: Floats) -> Floats:
     """Return (n, 3) barycentric coordinates of (n, 3) points in (n, 3, 3) triangles, point k in triangle k."""
     rows = triangle_rows(np.ascontiguousarray(triangles, dtype=np.float64).reshape(-1, 9))
-    return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), read_only(places))
+    return barycentric_on_triangles(rows, np.arange(len(rows), dtype=np.int32), read_only(points))
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,13 +241,13 @@ def _descend(
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
     leaves, together, middle = len(bounds) // 2, len(best), len(best) // 2
-    places, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)
+    coordinates, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)
     stack, gaps = np.empty(66, dtype=np.int64), np.zeros((66, together))
     for begin in range(0, len(points), together):
         last = which[together - 1]
         for k in range(together):
             p = min(begin + k, len(points) - 1)
-            places[0, k], places[1, k], places[2, k] = points[p, 0], points[p, 1], points[p, 2]
+            coordinates[0, k], coordinates[1, k], coordinates[2, k] = points[p, 0], points[p, 1], points[p, 2]
             best[k], which[k], gaps[0, k] = np.inf, last, 0.0
         stack[0], depth, begun = 1, 1, begin % run == 0
         while depth > 0:
@@ -267,7 +267,7 @@ def _descend(
                     bx, by, bz = bounds[child, 3], bounds[child, 4], bounds[child, 5]
                     interested = 0
                     for k in range(together):
-                        x, y, z = places[0, k], places[1, k], places[2, k]
+                        x, y, z = coordinates[0, k], coordinates[1, k], coordinates[2, k]
                         dx = ax - x if ax - x > x - bx else x - bx
                         dx = dx if dx > 0.0 else 0.0
                         dy = ay - y if ay - y > y - by else y - by
@@ -283,7 +283,7 @@ def _descend(
                         radius, thick = discs[child, 6], discs[child, 7]
                         interested = 0
                         for k in range(together):
-                            x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
+                            x, y, z = coordinates[0, k] - ax, coordinates[1, k] - ay, coordinates[2, k] - az
                             along = x * nx + y * ny + z * nz
                             height = abs(along) - thick
                             height = height if height > 0.0 else 0.0
@@ -320,7 +320,7 @@ def _descend(
                 first_length, second_length, third_length = rows[f, 9], rows[f, 12], rows[f, 15]
                 c, d, g, h = rows[f, 10], rows[f, 11], rows[f, 13], rows[f, 14]
                 for k in range(together):  # as in `away_from_triangle`
-                    x, y, z = places[0, k] - ax, places[1, k] - ay, places[2, k] - az
+                    x, y, z = coordinates[0, k] - ax, coordinates[1, k] - ay, coordinates[2, k] - az
                     p, q, up = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz, x * nx + y * ny + z * nz
                     r = p - first_length
                     beyond = -q if -q > q * c - p * d else q * c - p * d
