@@ -1,4 +1,4 @@
-"""Solids that must be the same: moved far away, renumbered, or of boxes that touch, coincide and overlap."""
+"""Solids that must be the same: moved far away, beside something far away, renumbered, or of boxes that touch."""
 
 from __future__ import annotations
 
@@ -19,6 +19,9 @@ GRAIN = 2.0**-20
 """Corners are multiples of this, and offsets below 2³² whole: moving them rounds nothing."""
 NEAR = 1e-6
 """Points nearer to the surface than this share of the size may have either sign."""
+BY_HEAT = 1e-2
+"""How far distances to loose triangles, which heat closes, may be apart, relative to the size: other grids, which
+depend on all that is there, change them by up to 3e-3."""
 ITERATED = 1e-5
 """How far volumes may be apart, relative to the cube of the size: heat, which closes soups, is iterated to 1e-6."""
 
@@ -82,6 +85,43 @@ def check_twins(given: Twins) -> str:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """A shape, the same with something that does not touch it, and points near the first."""
+
+    alone: Arrays
+    beside: Arrays
+    points: np.ndarray
+
+
+def beside(random: Random, folder: Path) -> Beside:
+    """A shape and a body, a triangle or a vertex of any size, three sizes of both to 10¹² times that away."""
+    vertices, faces = broken(random)
+    size = float(np.ptp(vertices, axis=0).max())
+    other = one_of(random, (samples.sphere(1), box([0, 0, 0], [1, 2, 3]), sh.TriangleMesh(np.eye(3), [[0, 1, 2]])))
+    scale = size * 10.0 ** random.uniform(-4, 4)
+    way = random.normal(size=3)
+    away = way / np.linalg.norm(way) * 3.0 * (size + 4.0 * scale) * 10.0 ** random.uniform(0, 12)
+    more, ids = scale * other.vertices + vertices.mean(axis=0) + away, np.array(other.faces)
+    if chance(random, 0.2):
+        more, ids = more[:1], ids[:0]
+    together = np.concatenate([vertices, more]), np.concatenate([faces, ids + len(vertices)])
+    points = vertices.mean(axis=0) + 0.5 * size * random.normal(size=(60, 3)).clip(-2, 2)
+    return Beside((vertices, faces), numbered_otherwise(random, *together), points)
+
+
+def check_beside(given: Beside) -> str:
+    """Distance at the points is the same."""
+    one, other = sh.complete(given.alone), sh.complete(given.beside)
+    size = float(np.ptp(given.alone[0], axis=0).max())
+    here, there = one.distance(given.points), other.distance(given.points)
+    loose = len(given.alone[0]) == 3 * len(given.alone[1])
+    differ = np.flatnonzero(np.abs(here - there) > (BY_HEAT if loose else NEAR) * size)
+    if len(differ):
+        raise Wrong("other distances", f"at {given.points[differ].tolist()}: {here[differ]} and {there[differ]}")
+    return "same"
+
+
+@dataclass(frozen=True)
 class Boxes:
     """A shape of boxes, centres of unit cells in its place, which of them are inside, and their volume."""
 
@@ -130,4 +170,5 @@ def check_boxes(given: Boxes) -> str:
 
 family("same solid moved", lambda random, folder: twins(random, True), check_twins)
 family("same solid renumbered", lambda random, folder: twins(random, False), check_twins)
+family("far and near", beside, check_beside)
 family("touching boxes", boxes, check_boxes)

@@ -6,7 +6,7 @@ import pytest
 
 from fuzz.frame import families, run_case
 
-KINDS = "surface ", "space ", "same ", "touching ", "arguments", "commands"
+KINDS = "surface ", "space ", "same ", "far ", "touching ", "arguments", "commands"
 FAMILIES = sorted(name for name in families() if name.startswith(KINDS))
 CASES, OF_ARGUMENTS = 12, 24
 """Of each family; of arguments, most of which are refused, more."""
