@@ -16,7 +16,7 @@ from signedheat.mesh.pinches import separated
 from signedheat.mesh.welding import indexed
 from signedheat.search.winding_tree import winding_sums
 from signedheat.solids import kept_faces
-from signedheat.solids.bodies import Bodies, crossing_faces, same_solid, whole_boundary, without_common
+from signedheat.solids.bodies import Bodies, crossing_faces, not_shared, same_solid, whole_boundary
 from signedheat.solids.winding import Windings
 
 BARS = [
@@ -178,9 +178,10 @@ def test_what_two_surfaces_do_not_share_winds_by_their_difference():
     both = np.concatenate([ball, block])
     turned = np.take_along_axis(both, (random.integers(0, 3, (len(both), 1)) + np.arange(3))[..., None] % 3, axis=1)
     shuffled = random.permutation(turned)
-    assert not len(without_common(shuffled, both))
-    rest = without_common(shuffled, np.concatenate([block, block[:4]]))
-    assert len(rest) == len(ball) + 4
+    assert [len(each) for each in not_shared(shuffled, both)] == [0, 0]
+    others = np.concatenate([block, block[:4]])
+    added, lost = not_shared(shuffled, others)
+    assert (len(added), len(lost)) == (len(ball), 4)
     points = random.uniform(-1, 1, (50, 3))
-    numbers = [winding_sums(triangles, points) for triangles in (rest, ball, block[:4])]
-    np.testing.assert_allclose(numbers[0], numbers[1] - numbers[2], atol=1e-12)
+    first, second, more, less = (winding_sums(triangles, points) for triangles in (shuffled, others, added, lost))
+    np.testing.assert_allclose(first - second, more - less, atol=1e-12)

@@ -31,7 +31,6 @@ from ..packages import lazy_module
 from ..search.winding_tree import WindingTree
 from ..surfaces.triangle_mesh import TriangleMesh
 from .closing import fan
-from .overlaps import directed
 from .regions import TOLERANCES, cut_and_sided
 from .winding import INSIDE_WINDING, Windings
 
@@ -40,7 +39,7 @@ manifold3d: Any = lazy_module("manifold3d", "unions of bodies")
 ROUNDING = ONE_PLACE * 2.0**-24
 """Distance by which rounding of files in single precision may move points, relative to the size of their part."""
 PROOF_SAMPLES = 20_000
-"""Largest number of faces whose sides are compared, evenly spread over all."""
+"""Largest number of places whose sides are compared, evenly spread over all faces; few faces have up to four each."""
 WRONG_VOLUME = 1e-6
 """Triangles count as the boundary of a solid if they may differ from it by at most this share of its volume."""
 
@@ -229,13 +228,15 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
     points, faces = indexed(triangles)
     if not len(faces) or (edge_table(faces).balance != 0).any():
         return False
-    rest = without_common(triangles, windings.triangles)
+    added, lost = not_shared(triangles, windings.triangles)
+    rest = np.concatenate([added, lost[:, ::-1]])
     further, wrong_area = WindingTree.of(rest) if len(rest) else None, 0.0
-    for chain, halvings in ((triangles, 0), (windings.triangles, 2)):
+    for chain in (triangles, lost):  # what both have is checked once
         chosen = _spread(len(chain))
         checked, widths = chain[chosen], tolerances(*indexed(chain), SAME_POINT)[chosen]
-        for _ in range(halvings):
-            checked, widths = halved(checked), np.tile(widths, 2)
+        for _ in range(2):
+            if 2 * len(checked) <= PROOF_SAMPLES:
+                checked, widths = halved(checked), np.tile(widths, 2)
         wrong = np.arange(len(checked))
         for multiple in TOLERANCES:
             rows, points_beside = _beside(checked[wrong], multiple * widths[wrong])
@@ -243,23 +244,25 @@ def same_solid(triangles: Floats, windings: Windings) -> bool:
             own_numbers = numbers + further.numbers(points_beside) if further else numbers
             differ = np.abs(own_numbers - (numbers > INSIDE_WINDING)) > 0.5
             wrong = wrong[rows[differ.reshape(2, -1).any(axis=0)]]
-        wrong_area += float(face_areas(checked[wrong]).sum()) * len(chain) / len(chosen)
+        wrong_area += float(face_areas(checked[wrong]).sum()) * len(chain) / max(len(chosen), 1)
     corners = triangles - points.mean(axis=0)
     volume = float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners))) / 3.0
     return wrong_area**1.5 / (6.0 * np.sqrt(np.pi)) <= WRONG_VOLUME * volume
 
 
-def without_common(triangles: Floats, others: Floats) -> Floats:
-    """Return (k, 3, 3) triangles, followed by others reversed, without those that are in both up to the last bit.
+def not_shared(triangles: Floats, others: Floats) -> tuple[Floats, Floats]:
+    """Return the (k, 3, 3) triangles that others lack, and the others that are none of them, up to the last bit.
 
-    Their winding numbers are the differences of those of the two.
+    The winding numbers of the first, less those of the second, are the differences between the two.
     """
     both = np.concatenate([triangles, others])
     corners = same_positions(both.reshape(-1, 3)).reshape(-1, 3)
     around = (corners.argmin(axis=1)[:, None] + np.arange(3)) % 3  # the corner to begin with does not matter
     numbers, first = distinct_rows(np.take_along_axis(corners, around, axis=1))
     counts = np.bincount(numbers[: len(triangles)], minlength=len(first))
-    return directed(both[first], counts - np.bincount(numbers[len(triangles) :], minlength=len(first)))
+    counts -= np.bincount(numbers[len(triangles) :], minlength=len(first))
+    added, lost = (np.repeat(both[first], np.maximum(way * counts, 0), axis=0) for way in (1, -1))
+    return added, lost
 
 
 def _beside(triangles: Floats, steps: Floats) -> tuple[Ints, Floats]:
