@@ -341,7 +341,10 @@ def _spelled(value: Any) -> Any:
 
 
 def _entries(arguments: Iterable[Any]) -> int:
-    """Count the entries of all arrays among the arguments of a kernel, also in tuples."""
+    """Count the entries of all arrays among the arguments of a kernel, also in tuples.
+
+    The count tells whether a call is so short that it needs no thread of its own to be interruptible.
+    """
     count = 0
     for value in arguments:
         if isinstance(value, np.ndarray):

@@ -27,21 +27,26 @@ class Constraint(Protocol):
     """
 
     def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
-        """Solve step 3 for φ under the constraint.
+        """Find φ, the signed distance at the unknowns, whose gradient is nearest to Y (step 3 of the method).
+
+        Y are the unit vectors of step 2, which point to where φ grows. A constraint calls one of the methods of
+        `integration` and returns its result.
 
         Parameters
         ----------
         integration : Integration
-            Solves Eq. 13 of the paper with constraints, on one domain.
+            Solves the linear system of Eq. 13 on one domain with n unknowns, with and without constraints.
         divergence : (n,) float
-            Right-hand side b of Eq. 13, the integrated divergence of the unit vectors Y.
+            Right-hand side of Eq. 13, one number for each unknown: ``b_i = ∫⟨∇λ_i, Y⟩``, with λ_i the hat function
+            that is 1 at unknown i and 0 at all others. On grids it is −∇·Y at the nodes, in the shape of the grid.
         source : SourceTerm
-            Samples of the source, at which φ is constrained, with weights and connected components.
+            Samples of the source, at which φ is constrained, with their weights and the connected component that each
+            is on.
 
         Returns
         -------
         (n,) float
-            φ at the unknowns, in the units of the domain.
+            φ at the unknowns, in the units of the domain; on grids in the shape of the grid.
 
         See Also
         --------
@@ -49,10 +54,17 @@ class Constraint(Protocol):
 
         Examples
         --------
+        A constraint of one's own, for which a solver calls `integrate`.
+
         >>> import signedheat as sh
-        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[1, -1], [1, 2]])
-        >>> round(sh.SignedHeatSolver(grid).distance(line, constraint=sh.constraints.Soft(1.0))([0.5, 0.5]).item(), 2)
-        0.5
+        >>> class MeanZero(sh.constraints.Constraint):
+        ...     def integrate(self, integration, divergence, source):
+        ...         phi = integration.solve(divergence, source)
+        ...         return phi - np.mean(phi)
+        >>> grid, line = sh.Grid((0, 0), 0.1, (21, 11)), sh.Polyline([[0.5, -1], [0.5, 2]])
+        >>> phi = sh.SignedHeatSolver(grid).distance(line, constraint=MeanZero())
+        >>> bool(abs(phi.values.mean()) < 1e-9)
+        True
         """
 
 

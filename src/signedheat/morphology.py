@@ -139,20 +139,21 @@ def dilate(
     shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
         The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        Distance by which the boundary moves, in the units of the shape; not negative.
+        How far the boundary moves outward, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
         Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
+        Curves need the surface that they lie on.
     resolution : int, optional
         Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`, for instance to set its options as in
-        ``partial(signed_distance, keep_overlaps=True)``.
+        Called as ``measure(shape, domain)``, it returns the `Field` of signed distance whose level sets are the
+        offsets. By default `signed_distance`; ``partial(signed_distance, keep_overlaps=True)`` sets one of its options.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The boundary of the result, closed, manifold, and oriented like the shape. It is a mesh in space, polylines in
-        the plane, and curves on a surface.
+        The boundary of the result, closed, manifold, and oriented like the shape: a `TriangleMesh` for shapes in space,
+        a list of `Polyline` for those in the plane, and a list of `Curve` for curves on a surface.
 
     Raises
     ------
@@ -194,21 +195,24 @@ def erode(
 
     Parameters
     ----------
-    shape : shape, curves or polylines
+    shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
         The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        Distance of each offset, in the units of the shape; not negative.
+        How far the boundary moves inward, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
         Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
+        Curves need the surface that they lie on.
     resolution : int, optional
         Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`.
+        Called as ``measure(shape, domain)``, it returns the `Field` of signed distance whose level sets are the
+        offsets. By default `signed_distance`; ``partial(signed_distance, keep_overlaps=True)`` sets one of its options.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The boundary of the result, closed, manifold, and oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape: a `TriangleMesh` for shapes in space,
+        a list of `Polyline` for those in the plane, and a list of `Curve` for curves on a surface.
 
     Raises
     ------
@@ -250,21 +254,24 @@ def opening(
 
     Parameters
     ----------
-    shape : shape, curves or polylines
+    shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
         The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        Distance of each offset, in the units of the shape; not negative.
+        How far the boundary moves inward, and then outward, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
         Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
+        Curves need the surface that they lie on.
     resolution : int, optional
         Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`.
+        Called as ``measure(shape, domain)``, it returns the `Field` of signed distance whose level sets are the
+        offsets, for the shape and for its first offset. By default `signed_distance`.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The boundary of the result, closed, manifold, and oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape: a `TriangleMesh` for shapes in space,
+        a list of `Polyline` for those in the plane, and a list of `Curve` for curves on a surface.
 
     Raises
     ------
@@ -305,21 +312,24 @@ def closing(
 
     Parameters
     ----------
-    shape : shape, curves or polylines
+    shape : TriangleMesh, PolygonMesh, PointCloud; in the plane Polyline; on a surface Curve; or a sequence of them
         The shape, which may be broken. Its inside is where `signedheat.signed_distance` is negative.
     distance : float
-        Distance of each offset, in the units of the shape; not negative.
+        How far the boundary moves outward, and then inward, in the units of the shape; not negative.
     domain : Grid, TetMesh, TriangleMesh or any other domain, optional
         Domain on which the signed distance is computed. By default, a grid around the shape with room for the result.
+        Curves need the surface that they lie on.
     resolution : int, optional
         Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`.
+        Called as ``measure(shape, domain)``, it returns the `Field` of signed distance whose level sets are the
+        offsets, for the shape and for its first offset. By default `signed_distance`.
 
     Returns
     -------
     TriangleMesh, or list of Polyline or Curve
-        The boundary of the result, closed, manifold, and oriented like the shape.
+        The boundary of the result, closed, manifold, and oriented like the shape: a `TriangleMesh` for shapes in space,
+        a list of `Polyline` for those in the plane, and a list of `Curve` for curves on a surface.
 
     Raises
     ------
@@ -372,16 +382,20 @@ def offset(
         offset planes of the faces are extended, up to twice the distance with "mitre", which keeps the edges of boxes,
         or up to ten times with "sharp".
     resolution : int
-        Number of nodes along the longest side of a grid around the surface.
+        Number of nodes along the longest side of the grid on which the surface is found. It lies around the box of the
+        completed shape, grown by the largest distance, with a fifth of the longest side as padding. With "mitre" and
+        "sharp", its cells have the same size, and it has room for the longest mitres instead.
     spacing : float or (3,) float, optional
         Size of the grid's cells, in the units of the shape, in place of `resolution`.
     progress : callable, optional
-        Called as ``progress(fraction, step)``. An exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
 
     Returns
     -------
     TriangleMesh
-        A closed manifold mesh without self-intersections, with vertices on sharp edges and at corners of the surface.
+        A closed manifold mesh without self-intersections, with normals that point away from the inside, and vertices on
+        sharp edges and at corners of the surface.
 
     Raises
     ------
@@ -417,7 +431,7 @@ def offset(
         reach = largest = finite_number(distance, "the distance")
     sides = np.array([[-1.0], [1.0]])
     grid = Grid.around(solid.bounds + sides * max(largest, 0.0), resolution, None, spacing)
-    if MITRE_LIMITS[corners] > 1:
+    if MITRE_LIMITS[corners] > 1:  # cells as large as above, so that corners do not change the resolution
         bounds = solid.bounds + sides * MITRE_LIMITS[corners] * max(largest, 0.0)
         grid = Grid.around(bounds, padding=2 * float(grid.spacing.max()), spacing=grid.spacing)
     return sharp_surface(Offset(solid, reach, MITRE_LIMITS[corners]), grid, progress)
@@ -452,7 +466,8 @@ def shell(
     resolution : int, optional
         Number of nodes along the longest side of the default grid; 128 by default.
     measure : callable, optional
-        Called as ``measure(shape, domain)`` in place of `signed_distance`, as for `dilate`.
+        Called as ``measure(shape, domain)``, it returns the `Field` of signed distance between whose level sets the
+        wall lies. By default `signed_distance`.
     keep_outside : bool
         If true, which needs ``outer=0``, the outer side consists of the faces of the shape and of its completion.
     drain : float, optional

@@ -130,7 +130,7 @@ class Command:
 
     @property
     def declared(self) -> dict[str, Option]:
-        """All options of the command, with those that all commands have, by their last name."""
+        """All options of the command, and those that all commands have, keyed by the last of their names."""
         groups = (entry.options if isinstance(entry, Group) else (entry,) for entry in (*COMMON, *self.options))
         return {option.names[-1]: option for options in groups for option in options}
 

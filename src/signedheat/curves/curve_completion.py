@@ -46,11 +46,11 @@ def close_curves(
     as_oriented: bool = False,
     every_piece: bool = False,
 ) -> list[Curve]:
-    """Close the gaps of broken curves by the zero set of the signed distance to them.
+    """Close the gaps of broken curves by the zero set of φ, the signed distance to them.
 
-    On triangle meshes the method runs on an intrinsic triangulation whose edges follow the curves. So curves may be
-    smaller than the triangles, and the result coincides with them except at gaps. The mesh is repaired, and curves are
-    flipped and left out, as by `signed_distance`.
+    Before, a mesh is repaired, curves are flipped so that they bound a region together, and those that bound nothing
+    are left out, as by `signed_distance`. On triangle meshes the method runs on an intrinsic triangulation whose edges
+    follow the curves. So curves may be smaller than the triangles, and the result coincides with them except at gaps.
 
     Parameters
     ----------
@@ -60,8 +60,10 @@ def close_curves(
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface.
     diffusion : float
-        τ in ``t = τ h²``: larger values close gaps along rounder lines (Fig. 18). On triangle meshes h is at most half
-        the length of the curves' segments, unless the triangles made along them are larger.
+        Factor τ of the time ``t = τ h²`` for which normals of the curves are diffused like heat; larger values close
+        gaps along rounder lines (Fig. 18). The length h is half the mean length of edges. If a curve with gaps on a
+        triangle mesh has short pieces, h is smaller: half the mean length of these pieces, or half the size of the
+        intrinsic triangles along the curves if that is more.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Constraint on φ at the curves. With `ZeroSet`, the default, the result passes through them. With `EachComponent`
         and `LevelValues` no curve is flipped or left out.
@@ -73,8 +75,8 @@ def close_curves(
     Returns
     -------
     list of Curve
-        One curve for each connected component of the zero set, oriented as the given curves. Each is closed or ends at
-        the boundary of the surface.
+        One curve for each connected component of the zero set, oriented as the given curves are after flipping. Each is
+        closed or ends at the boundary of the surface.
 
     Raises
     ------
@@ -111,7 +113,8 @@ def close_curves(
         )
     listed = as_curves(surface, as_list(curves))
     refuse_without_sides(listed)
-    return completion(surface, listed, constraint, diffusion, None, as_oriented, every_piece)[1]
+    _, completed = completion(surface, listed, constraint, diffusion, as_oriented=as_oriented, every_piece=every_piece)
+    return completed
 
 
 def completion(

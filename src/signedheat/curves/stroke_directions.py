@@ -309,7 +309,10 @@ def altered(signs: Floats, rows: list[int], factor: float) -> Floats:
 
 
 def cost(strokes: Strokes, inside: Inside) -> float:
-    """Return the energy of an inside plus the cost of the strokes flipped for it, as a length."""
+    """Return the cost of an inside, as a length: its energy plus `TURNING_COST` for each length of flipped strokes.
+
+    The energy is the length of the boundary where no stroke is, less the length of strokes that it explains.
+    """
     return inside.energy + TURNING_COST * float(strokes.lengths[inside.signs < 0].sum())
 
 

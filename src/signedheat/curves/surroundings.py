@@ -108,9 +108,9 @@ def moved(source: Any, renumbered: Callable[[Ints], Ints]) -> Any:
     return Curve(faces, source.barycentric, source.closed, source.oriented, source.normals)
 
 
-def positions_of_nodes(mesh: TriangleMesh, part: CurveSegments) -> Floats:
+def positions_of_nodes(mesh: TriangleMesh, curve: CurveSegments) -> Floats:
     """(s, 3) positions in space of the nodes of a curve."""
-    return np.einsum("nk,nkx->nx", part.nodes.barycentric, mesh.vertices[mesh.faces[part.nodes.faces]])
+    return np.einsum("nk,nkx->nx", curve.nodes.barycentric, mesh.vertices[mesh.faces[curve.nodes.faces]])
 
 
 def edges_of(corners: Ints) -> tuple[Ints, Ints]:

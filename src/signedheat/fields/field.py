@@ -690,8 +690,9 @@ class Field(Displayed, Frozen, Generic[Domain]):
         other : Field
             A field on the same domain.
         rule : callable
-            Takes the values of this field and those of the other, and returns an array of the same shape. An example
-            is `np.minimum`.
+            Elementwise function, such as `np.minimum`, of two arrays of the same shape: values of this field, and of
+            the other at the same points. It returns an array of that shape. It is called again where the fields have
+            values elsewhere, on the coarse grid of a band or on finer triangles.
 
         Returns
         -------
@@ -727,7 +728,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
             return Field(domain, values)
         finest = max(triangulations, key=lambda triangulation: triangulation.n_vertices)
         fine_values = rule(self._at_vertices_of(finest), other._at_vertices_of(finest))
-        fine_values[: len(values)] = values
+        fine_values[: len(values)] = values  # the vertices of the mesh come first, and are not interpolated
         return Field(domain, values, finer=Field(finest, fine_values))
 
     def _at_vertices_of(self, triangulation: IntrinsicTriangulation) -> Floats:

@@ -79,10 +79,13 @@ def _fill(
 ) -> Bools:
     """Write squared distances and nearest faces of the nodes of blocks; return (n,) which blocks are too crowded.
 
-    Blocks begin at (n, 3) nodes `firsts`, and `start`, (n,), are faces near their centres. `rows`, `bounds`, `discs`
-    and `items` are those of the search tree; `origin`, `steps` and `limits` those of the lattice. The arrays to write
-    to, (a, b, c), begin at node `window`. `eighths` is `EIGHTHS`.
+    A block is too crowded if more than `CROWDED_LEAVES` leaves of the tree can be nearest to its nodes. Nothing is
+    written for it. Blocks begin at (n, 3) nodes `firsts`, and `start`, (n,), are the faces nearest to their centres.
+    `rows`, (f, 16), `bounds`, (2 · leaves, 6), `discs`, (2 · leaves, 8), and `items`, (leaves · `BOXES_PER_LEAF`,), are
+    those of the search tree of f faces; `origin`, `steps` and `limits`, (3,), are the fields of the `Lattice`. The
+    arrays to write to, `out_squares` and `out_faces`, (a, b, c), begin at node `window`, (3,). `eighths` is `EIGHTHS`.
     """
+    # candidates of each eighth at three levels of division, room for their distances, and the cubes still to divide
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = BOXES_PER_LEAF * min(CROWDED_LEAVES, leaves) + 1
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
@@ -91,6 +94,7 @@ def _fill(
     stack, cubes = np.empty(64, dtype=np.int64), np.empty((3 * parts, 5), dtype=np.int64)
     crowded = np.zeros(len(firsts), dtype=np.bool_)
     for b in range(len(firsts)):
+        # centre and half widths of the block, the nearest point of its centre, and the leaves that can be nearer
         for d in range(3):
             half = 0.5 * (min(firsts[b, d] + BLOCK, limits[d]) - 1 - firsts[b, d])
             box[d], box[3 + d] = origin[d] + (firsts[b, d] + half) * steps[d], half * steps[d]
@@ -99,12 +103,14 @@ def _fill(
         crowded[b] = n_near > len(near)
         if crowded[b]:
             continue
+        # all faces in these leaves are candidates for the whole block
         faces[0, 0, 0], counts[0, 0] = start[b], 1
         for c in range(n_near):
             for item in range((near[c] - leaves) * BOXES_PER_LEAF, (near[c] - leaves + 1) * BOXES_PER_LEAF):
                 if items[item] >= 0:
                     faces[0, 0, counts[0, 0]] = items[item]
                     counts[0, 0] += 1
+        # divide cubes, (first node, level, row of candidates), into eighths until these are single nodes
         for d in range(3):
             cubes[0, d] = firsts[b, d]
         cubes[0, 3], cubes[0, 4] = 0, 0
@@ -119,8 +125,10 @@ def _fill(
                 centres[2, e] = origin[2] + (k + side * eighths[2, e] + 0.5 * (side - 1)) * steps[2]
             _nearest(rows, faces[level, slot], counts[level, slot], centres, away, best, which)
             if side > 1:
+                # each eighth keeps the candidates that can be nearest to one of its nodes
                 candidates, n = faces[level, slot], counts[level, slot]
                 _divide(candidates, n, away, best, which, 0.5 * (side - 1) * steps, faces[level + 1], counts[level + 1])
+            # eighths on the lattice are divided next, or written if they are single nodes
             for e in range(parts):
                 p, q, r = i + side * eighths[0, e], j + side * eighths[1, e], k + side * eighths[2, e]
                 if p < limits[0] and q < limits[1] and r < limits[2]:

@@ -230,7 +230,13 @@ class Deviation(Frozen):
 
     @property
     def figures(self) -> dict[str, object]:
-        """Summary figures, ready for JSON: counts, shares from 0 to 1, and deviations in the units of the scan."""
+        """Summary figures by name, ready for JSON; deviations are in the units of the scan, positive outside.
+
+        "points" is the number of points that count, "mean" their mean deviation and "rms" the root mean square.
+        "percentiles" holds the percentiles "0", "1", "5", "25", "50", "75", "95", "99" and "100". "on_completion" and
+        "beyond_rim" are the shares of points, from 0 to 1, whose nearest point lies on the completion of the part, and
+        that lie beyond the boundary of an open part.
+        """
         return {
             "points": len(self.of_surface),
             "mean": float(self.of_surface.mean()),

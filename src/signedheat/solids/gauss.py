@@ -372,7 +372,11 @@ class Dipoles:
         return self._at_dipoles(partial(_potentials, self._walk, vectors, nodes)) / (4.0 * np.pi)
 
     def levels_within(self, signs: Floats, groups: Ints) -> Floats:
-        """(n,) zeros, for levels at the dipoles due to their own group only, since loose triangles have none."""
+        """(n,) zeros in place of levels due to their own group only; `signs` and `groups` are (k,), as for `Matrix`.
+
+        With zeros, no group counts as a body by itself: dipoles stand for loose triangles, which are judged cluster by
+        cluster.
+        """
         return np.zeros(len(self.owners))
 
     def _adjoint(self, charges: Floats) -> Floats:

@@ -45,11 +45,13 @@ class Orientation(Frozen, ShortRepr):
     undecided : (k,) bool
         Faces of sheets, which bound nothing. They are consistent with their neighbours.
     inner : (k,) bool
-        Walls between closed cells (see `inner_walls`), which bound nothing. They are left as they are.
+        Inner walls, which divide a solid into closed cells, so that there is solid on both sides. They are left as
+        they are.
     n_parts, closed_parts : int
         Number of patches, and of closed ones among them.
     turned_parts, turned_faces, turned_area : int, int, float
-        Number of patches that were given facing inwards, number of flipped faces, and their share of the area.
+        Number of patches of which more than half the area was flipped, sheets apart, number of flipped faces, and their
+        share of the area.
     inconsistent_edges : int
         Number of edges whose two faces were oriented inconsistently.
     nonmanifold_edges : int
@@ -123,16 +125,17 @@ def orientation(
 ) -> Orientation | CurveOrientation:
     """Orient a mesh, or curves on a surface, and report which faces or curves were flipped, merged and left out.
 
-    Vertices that coincide up to rounding count as one, and so do faces on the same corners. A closed part whose faces
-    are consistent is kept, or flipped as a whole to face outwards. Other faces are made consistent with their
-    neighbours across edges of two faces. Walls between closed cells are not flipped (`inner_walls`). How often all
-    faces go around a point, their winding number, decides which way each connected patch faces, and which patches are
-    sheets that enclose nothing.
+    Faces that bound a solid face out of it. So bodies face outwards, and cavities, whose normals point into the hollow,
+    inwards. Vertices that coincide up to rounding count as one, and so do faces on the same corners. A closed part
+    whose faces are consistent is kept or flipped as a whole. Other faces are made consistent with their neighbours
+    across edges of two faces, and the winding number of all faces decides which way each connected patch of them faces.
+    Sheets, which enclose nothing, are only made consistent. Walls between the closed cells of a solid are not flipped;
+    the attribute `inner` of the result marks them.
 
     Curves are flipped so that they bound a region together. Where they leave gaps, it is the region with the shortest
     boundary.
 
-    Meshes take O(n log n) time.
+    Meshes of n faces take O(n log n) time.
 
     Parameters
     ----------
@@ -141,14 +144,17 @@ def orientation(
     domain : TriangleMesh, PolygonMesh, PointCloud, DigitalSurface or IntrinsicTriangulation
         The surface that the curves lie on.
     nested : {"given", "cavities", "bodies"}
-        For meshes: whether closed parts within others are bodies or cavities. With "given", that depends on how they
-        face relative to the part around. With "cavities", they are cavities, and parts within these are bodies. With
-        "bodies", all are bodies.
+        For meshes: whether closed parts within others are bodies, which face outwards, or cavities, which face inwards.
+        With "given", a part is a body if it faces as the part around does, and else a cavity. With "cavities", they are
+        cavities, and parts within these are bodies. With "bodies", all are bodies.
 
     Returns
     -------
     Orientation or CurveOrientation
-        The oriented mesh or curves, and which of them were flipped.
+        For a mesh, `results.Orientation`: the oriented mesh, which of its faces were flipped, how many were merged or
+        are sheets or inner walls, and the number of bodies and cavities within others. For curves on a surface,
+        `results.CurveOrientation`: the oriented curves, which of them were flipped, and how well the region explains
+        each.
 
     Raises
     ------
@@ -270,9 +276,10 @@ def orient(shape: Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape)
 def orient(
     shape: Mesh | ForeignShape | Sequence[CurveOrPoints], domain: SurfaceDomain | ForeignShape | None = None
 ) -> Mesh | list[CurveOrPoints]:
-    """Flip faces of a mesh so that all are consistent and face outwards, or curves so that they bound a region.
+    """Flip faces of a mesh so that all are consistent and face out of the solid, or curves so that they bound a region.
 
-    `orientation` also reports what was flipped.
+    Bodies face outwards and cavities inwards; sheets, which enclose nothing, are only made consistent. `orientation`
+    also reports what was flipped.
 
     Parameters
     ----------

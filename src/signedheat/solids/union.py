@@ -119,7 +119,10 @@ def _windings_of(triangles: Floats, given: Windings) -> Windings:
 
 
 def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:
-    """Return (n, 3) points, and the (m, 3) faces of a group on the first point at each position."""
+    """Return (n, 3) points, one for each corner id of a group, and its (m, 3) faces.
+
+    Faces use the first of the points at each position, so that faces that touch share vertices.
+    """
     points = whole.triangles.reshape(-1, 3)[first_members(whole.ids.ravel(), int(whole.ids.max()) + 1)]
     return points, same_positions(points)[whole.ids]
 

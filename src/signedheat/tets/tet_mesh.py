@@ -227,7 +227,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
 
     @classmethod
     def from_pyvista(cls, grid: pyvista.UnstructuredGrid) -> TetMesh:
-        """Convert the tets of a grid of PyVista; its faces, lines and vertices are left out.
+        """Convert the tets of a grid of PyVista; its polygons, lines and vertex cells (single points) are left out.
 
         Parameters
         ----------

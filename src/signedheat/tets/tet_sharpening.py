@@ -169,14 +169,17 @@ def _any_angle(
 ) -> tuple[Floats, Floats, int]:
     """(n,) distances of vertices from the surface, (n, 3) points where their paths start, and how many are hidden.
 
-    Hidden are vertices that do not see the nearest point. `nearest`, (n,), has the nearest triangles, in sight or not,
-    or −1; it is overwritten by those that paths start from. Lines may lie `slack` outside the mesh.
+    A path starts on the surface, runs inside the mesh, and bends at vertices only. Hidden are vertices that do not see
+    the nearest point; their paths grow from vertex to vertex of a tet, the shortest first. `nearest`, (n,), has the
+    nearest triangles, in sight or not, or −1 for vertices without a value, which no path reaches; it is overwritten by
+    the triangles that paths start from. Distances that no path reaches are infinite. Lines may lie `slack` outside the
+    mesh.
     """
     points, tets, _, first_tet, tets_at = vertices
     n = len(points)
     distance = np.full(n, np.inf)
-    bend, feet = np.full(n, -1), np.zeros((n, 3))
-    known = np.zeros(n, dtype=np.bool_)
+    bend, feet = np.full(n, -1), np.zeros((n, 3))  # the vertex where the path to each last bends, −1 if it is straight
+    known = np.zeros(n, dtype=np.bool_)  # whether it sees the nearest point, so that its distance is final
     for v in range(n):
         if nearest[v] >= 0:
             x, y, z = points[v]
@@ -202,7 +205,7 @@ def _any_angle(
                     u = tets[tets_at[i], k]
                     if known[u]:
                         push(queue, u, distance[u])
-    done = np.zeros(n, dtype=np.bool_)
+    done = np.zeros(n, dtype=np.bool_)  # whether the distance of a vertex was passed on to its neighbours
     while queue.size[0] > 0:
         u = pop(queue)
         done[u] = True
@@ -212,7 +215,7 @@ def _any_angle(
                 if known[v] or done[v] or nearest[v] < 0:
                     continue
                 x, y, z = points[v]
-                if bend[u] >= 0:
+                if bend[u] >= 0:  # try a line from the last bend of the path to u, or from the surface; else bend at u
                     via, triangle, foot, length = bend[u], nearest[u], feet[u], distance[bend[u]]
                     target = points[via]
                 else:

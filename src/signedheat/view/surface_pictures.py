@@ -355,10 +355,10 @@ def draw_surface(
     colors : matplotlib.cm.ScalarMappable, optional
         The colours of values. If they are given, isolines and colour bar are left out.
     """
-    own, mesh, values = _own_and_painted(field)
+    source_mesh, mesh, values = _source_mesh_and_painted(field)
     given = sources if isinstance(sources, Sequence) else [sources]
     flat = [item for source in given for item in (source if isinstance(source, Sequence) else [source])]
-    direction = toward_sources(own, flat, up) if view is None else view
+    direction = toward_sources(source_mesh, flat, up) if view is None else view
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
@@ -374,21 +374,23 @@ def draw_surface(
         darken(image, phi, covered, step)
     axes.imshow(image, origin="lower", interpolation="antialiased")
     for item in flat:
-        draw_source(axes, item, own, camera, depth)
+        draw_source(axes, item, source_mesh, camera, depth)
     axes.set_axis_off()
     if colors is None:
-        spanned = np.array([low, *isolines, high]) if high > low else isolines  # span both signs
+        spanned = (
+            np.array([low, *isolines, high]) if high > low else isolines
+        )  # the bar spans all values, not only isolines
         add_color_bar(axes.figure, [axes], scale, spanned, step)
 
 
-def _own_and_painted(field: Field[Any]) -> tuple[TriangleMesh, Any, Floats]:
+def _source_mesh_and_painted(field: Field[Any]) -> tuple[TriangleMesh, Any, Floats]:
     """Return the mesh to whose faces sources refer, the mesh on whose faces φ is linear, and φ at its (n,) vertices."""
     domain = field.domain
     surface = domain.surface if isinstance(domain, CutSurface) else domain
-    own = surface.mesh if isinstance(surface, IntrinsicTriangulation) else surface.triangulation
+    source_mesh = surface.mesh if isinstance(surface, IntrinsicTriangulation) else surface.triangulation
     painted = field.expand()
     drawn: Any = painted.domain
-    return own, drawn.triangulation, drawn.on_triangulation(painted.values)
+    return source_mesh, drawn.triangulation, drawn.on_triangulation(painted.values)
 
 
 def darken(image: Floats, phi: Floats, covered: Bools, step: float) -> None:
