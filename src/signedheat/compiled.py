@@ -16,6 +16,7 @@ import logging
 import os
 import pickle
 import re
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
@@ -92,6 +93,8 @@ class Kernel(Generic[Parameters, Returned]):
             if not Kernel.is_kept or not any(isinstance(cause, DAMAGE) for cause in _chain(error)):
                 raise
             logger.warning("the cache of compiled kernels is not used any more: %s", error)
+            if not any(isinstance(cause, OSError) for cause in _chain(error)):
+                _remove(self)  # so that the next process compiles it again, and keeps that
         with _lock:
             Kernel.is_kept = False
             while made:
@@ -299,26 +302,45 @@ def _digest(kernel: Kernel[..., Any]) -> str:
     This is Numba's version and, for the kernel and all kernels that it calls, code, options, constants and named
     tuples. Numba's cache refers to named tuples by their modules, and fails if they have moved.
     """
-    digest, seen, waiting = hashlib.sha256(repr(numba.version_info).encode()), set(), [kernel]
-    while waiting:
-        current = waiting.pop()
-        if current in seen:
-            continue
-        seen.add(current)
+    digest = hashlib.sha256(repr(numba.version_info).encode())
+    for current in _with_called(kernel):
         function = current.function
         digest.update(repr((current.__module__, current.options, _spelled(function.__code__))).encode())
         mentioned = [*function.__annotations__.values(), *function.__code__.co_names]
         digest.update("".join(_named_tuples(mentioned, function.__globals__)).encode())
-        cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-        names = {name: function.__globals__.get(name) for name in function.__code__.co_names}
-        for name, value in {**names, **{name: cell.cell_contents for name, cell in cells}}.items():
-            if isinstance(value, Kernel):
-                waiting.append(value)
-            elif isinstance(value, np.ndarray):
+        for name, value in _values(function):
+            if isinstance(value, np.ndarray):
                 digest.update(f"{name}{value.dtype}{value.shape}".encode() + value.tobytes())
             elif isinstance(value, bool | int | float | complex | str | tuple | np.generic):
                 digest.update(f"{name}={value!r}".encode())
     return digest.hexdigest()[:16]
+
+
+def _with_called(kernel: Kernel[..., Any]) -> Iterator[Kernel[..., Any]]:
+    """Yield a kernel, and all kernels that it calls, directly or through others."""
+    seen, waiting = set(), [kernel]
+    while waiting:
+        current = waiting.pop()
+        if current not in seen:
+            seen.add(current)
+            yield current
+            waiting += [value for _, value in _values(current.function) if isinstance(value, Kernel)]
+
+
+def _values(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
+    """Yield the global names and the variables of enclosing functions that a function uses, with their values."""
+    for name in function.__code__.co_names:
+        yield name, function.__globals__.get(name)
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+
+
+def _remove(kernel: Kernel[..., Any]) -> None:
+    """Remove the cache folders of a kernel and of the kernels that it calls, one of which has a damaged file."""
+    for current in _with_called(kernel):
+        for name in (_digest(current), f"{_digest(current)}_part"):
+            for root in _roots(name):
+                shutil.rmtree(root / name / _processor(), ignore_errors=True)
 
 
 def _named_tuples(mentioned: Iterable[Any], names: dict[str, Any]) -> Iterator[str]:
