@@ -62,7 +62,7 @@ def close_curves(
     diffusion : float
         Factor τ of the time ``t = τ h²`` for which normals of the curves are diffused like heat; larger values close
         gaps along rounder lines (Fig. 18). The length h is half the mean length of edges. If a curve with gaps on a
-        triangle mesh has short pieces, h is smaller: half the mean length of these pieces, or half the size of the
+        triangle mesh has short strokes, h is smaller: half the mean length of these strokes, or half the size of the
         intrinsic triangles along the curves if that is more.
     constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
         Constraint on φ at the curves. With `ZeroSet`, the default, the result passes through them. With `EachComponent`
