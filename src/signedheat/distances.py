@@ -173,12 +173,14 @@ def signed_distance(
         Room between the shape and the sides of the default grid, in units of the shape; by default a fifth of its
         longest side.
     band : float, optional
-        In space, compute only nodes of the grid whose distance is at most this length, in the units of the shape.
+        In space, compute only nodes of the grid whose distance is at most this length, in the units of the shape. By
+        default all nodes are computed.
     completion, lids, nested : str
-        In space, options of `complete`. With ``completion="none"``, also on surfaces and in the plane, nothing is
-        completed and distance is unsigned. That suits clothes and networks of curves.
+        In space, options of `complete`; by default "lids", "bent" and "given". With ``completion="none"``, also on
+        surfaces and in the plane, nothing is completed and distance is unsigned. That suits clothes and networks of
+        curves.
     constraint : Free, ZeroSet or Soft, optional
-        Constraint on φ at the source, if the signed heat method is used; by default `ZeroSet`.
+        Constraint on φ, the field, at the source, if the signed heat method is used; by default `ZeroSet`.
     diffusion : float, optional
         Factor τ of the time ``t = τ h²`` for which the signed heat method diffuses normals of the source like heat,
         with h the size of cells or triangles; 1 by default. Larger values close gaps more roundly.
@@ -187,13 +189,15 @@ def signed_distance(
     as_oriented : bool
         If true, no face or curve is flipped, no outline is filled, and no curve is left out.
     keep_overlaps : bool
-        In space, keep surfaces that lie inside other bodies.
+        In space, whether to keep surfaces that lie inside other bodies. By default they are left out.
     every_piece : bool
-        On surfaces and in the plane, leave no curve out.
+        On surfaces and in the plane, whether to keep curves that bound nothing. By default they are left out.
     intrinsic : "auto", True or False
-        On surfaces, whether to use an intrinsic triangulation, as for `SignedHeatSolver`.
+        On surfaces, whether to use an intrinsic triangulation, as for `SignedHeatSolver`. With "auto", the default, it
+        is used if large angles or thin triangles would make distance inaccurate.
     progress : callable, optional
-        Called as ``progress(fraction, step)``. An exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
 
     Returns
     -------

@@ -149,7 +149,7 @@ def distance_to_nearest(
 
 @runtime_checkable
 class Method(Protocol):
-    """Protocol of methods of sharpening, for fields on surfaces and tets."""
+    """Protocol of methods of sharpening, for fields φ on surfaces and tets."""
 
     def sharpened(
         self,
@@ -159,7 +159,7 @@ class Method(Protocol):
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[Floats, tuple[Note, ...]]:
-        """Sharpen the values of a field on linear elements.
+        """Sharpen the values of a field φ, which is linear on triangles or tets. `sharpen` calls this.
 
         Parameters
         ----------
@@ -169,10 +169,11 @@ class Method(Protocol):
             Elements on which φ is linear.
         values : (n,) float
             φ at the unknowns of the elements, in the units of the domain.
-        source : SourceTerm, optional
-            The source from which φ was computed.
+        source : SourceTerm or None
+            The source from which φ was computed, if it is known.
         progress : callable, optional
-            Called as ``progress(fraction, text)``.
+            Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+            begins. An exception that it raises cancels.
 
         Returns
         -------
@@ -184,7 +185,7 @@ class Method(Protocol):
         Raises
         ------
         SourceError
-            If the method is `Convex`, and the field comes without its source.
+            If the method needs the source, as `Convex` does, and it is not known.
 
         See Also
         --------
@@ -192,17 +193,23 @@ class Method(Protocol):
 
         Examples
         --------
+        A method of one's own: geodesic distance without sign.
+
         >>> import signedheat as sh
+        >>> class Unsigned(sh.methods.Geodesic):
+        ...     def sharpened(self, *arguments):
+        ...         values, notes = super().sharpened(*arguments)
+        ...         return abs(values), notes
         >>> ball = sh.samples.sphere(2)
-        >>> phi = sh.SignedHeatSolver(ball).distance(ball.points_at(0))
-        >>> [len(sh.sharpen(phi, method=method).values) for method in (sh.methods.Geodesic(), sh.methods.Convex())]
-        [162, 162]
+        >>> phi = sh.SignedHeatSolver(ball).distance(ball.level_set(ball.vertices[:, 2], 0.01))
+        >>> bool(sh.sharpen(phi, method=Unsigned()).values.min() >= 0)
+        True
         """
 
 
 @dataclass(frozen=True)
 class Geodesic(Method):
-    """Sharpen φ to the geodesic distance from its zero set, with the signs of φ (Eq. 17). This is the default.
+    """Sharpen a field φ to the geodesic distance from its zero set, with the signs of φ (Eq. 17), the default.
 
     On surfaces it is exact polyhedral distance, whatever the shape of the triangles. Distance to unoriented curves and
     to points is measured from these themselves, even if φ is not zero there. If no source is oriented, distance is
@@ -254,13 +261,13 @@ their range."""
 
 @dataclass(frozen=True)
 class Convex(Method):
-    """Sharpen φ by a convex problem, whose solution has gradients of length at most 1 (Eq. 17, Eq. 18).
+    """Sharpen a field φ by a convex problem, whose solution has gradients of length at most 1 (Eq. 17, Eq. 18).
 
     It maximises ``Σ A_i sign(φ⁰_i) φ_i`` under ``|∇φ| ≤ 1`` in every cell and φ = 0 on the source, where φ⁰ is the
-    given field and A_i are areas or volumes. This can correct signs that a long diffusion has made wrong. But a
-    function with such gradients is a lower bound of distance. On fine triangle meshes `Geodesic` is far more accurate,
-    and on tets the bias is larger than the error of the unsharpened field. The solver is ADMM with one factorisation
-    (Belyaev & Fayolle 2020).
+    given field and A_i the area or volume around vertex i. This can correct signs that a long diffusion has made wrong.
+    But a function with such gradients is a lower bound of distance. On fine triangle meshes `Geodesic` is far more
+    accurate, and on tets the bias is larger than the error of the unsharpened field. The solver is ADMM with one
+    factorisation (Belyaev & Fayolle 2020).
 
     Parameters
     ----------
@@ -269,7 +276,7 @@ class Convex(Method):
     max_rounds : int
         Largest number of iterations. The number needed and the residual are in the diagnostics.
     relaxation : float
-        Factor of over-relaxation, at least 1 and below 2.
+        Factor of over-relaxation, at least 1 and below 2. It changes the number of iterations, not the solution.
 
     See Also
     --------

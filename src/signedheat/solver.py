@@ -66,7 +66,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         distance between unknowns. Larger values close gaps in broken sources along rounder lines. The paper uses 1. The
         default is 1 in space and `Extrapolated` on surfaces.
     progress : callable, optional
-        Called as ``progress(fraction, step)``. An exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
     intrinsic : "auto", True or False
         Whether the method runs on an intrinsic Delaunay refinement of a triangle mesh instead of its triangles.
 
@@ -142,7 +143,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Parameters
         ----------
         diffusion : float, Extrapolated or None
-            Factor τ of the diffusion time ``t = τ h²``, as for the class.
+            Factor τ of the diffusion time ``t = τ h²``, with h the mean distance between unknowns, as for the class.
+            None stands for its default.
 
         Returns
         -------
@@ -285,7 +287,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         sources : sequence
             Entries that `distance` accepts as its `sources`.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
-            Constraint on every field; `ZeroSet` by default. With `Free`, the sources share most of the work.
+            Constraint on every field at its source; `ZeroSet` by default. With `Free`, the sources share most of the
+            work.
 
         Returns
         -------

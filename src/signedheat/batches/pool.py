@@ -356,7 +356,8 @@ def run(
     time_limit : float, optional
         Seconds after which a shape is abandoned.
     progress : callable, optional
-        Called as ``progress(fraction, text)``. An exception that it raises stops the batch.
+        Called as ``progress(fraction, text)`` with the fraction of shapes done, from 0 to 1, and a line that says how
+        many. An exception that it raises stops the batch.
     report : callable, optional
         Called with the `Outcome` of each shape as soon as it ends.
 

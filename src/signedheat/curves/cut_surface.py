@@ -114,7 +114,7 @@ class CutSurface(LinearDomain, Frozen):
 
     @cached_property
     def pairs(self) -> FacePairs:
-        """The pairs of triangles that share an edge."""
+        """The p pairs of triangles that share an edge, with the corners at the ends of that edge."""
         return face_pairs(self.triangles)
 
     def jumps(self, values: Floats) -> Floats:

@@ -80,12 +80,14 @@ def piecewise_distance(
     -----
     Let Y be the diffused and normalised source normals. First, φ is the function with gradient Y in every triangle
     that minimises ``Σ_e |e| exp(−κ_e) (|jump at one end of e| + |jump at the other|)`` over all edges e, where κ_e is
-    the difference between the components of Y along e in the two faces at e (Eq. 15, Eq. 16). Edges at the source have
-    100 times the weight, which keeps the cut away from the source. Second, the surface is cut open along the lines of
-    large jumps, and step 3 of the method (Eq. 13) makes φ continuous on it, with gradients near Y.
+    the difference between the components of Y along e in the two faces at e (Eq. 15, Eq. 16). The length of e is |e|.
+    Edges at the source have 100 times the weight, which keeps the cut away from the source. Second, the surface is cut
+    open along the lines of large jumps, and step 3 of the method (Eq. 13) makes φ continuous on it, with gradients near
+    Y.
 
     Without a cut, φ differs from `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean
-    square, where λ is the least positive eigenvalue of the Laplacian.
+    square, where the note `diagnostics.Jumps` has the ``integration_error``, and λ is the least positive eigenvalue of
+    the Laplacian.
 
     Parameters
     ----------
@@ -95,7 +97,7 @@ def piecewise_distance(
     domain : TriangleMesh, PolygonMesh or IntrinsicTriangulation
         The surface.
     diffusion : float
-        τ in ``t = τ h²``, the time for which normals of the curves are diffused like heat, with h half the mean
+        Factor τ of ``t = τ h²``, the time for which normals of the curves are diffused like heat, with h half the mean
         length of edges. Larger values close gaps along rounder lines.
     intrinsic : "auto", True or False
         Whether φ is computed on an intrinsic triangulation, as for `SignedHeatSolver`. "auto" refines a triangle mesh
@@ -104,7 +106,8 @@ def piecewise_distance(
         Whether φ is made continuous away from its cut. If false, the second step is left out, so that small jumps
         remain and the gradient is Y in every triangle. That is better where halves of a curve face each other.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
 
     Returns
     -------

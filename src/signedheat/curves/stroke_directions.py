@@ -377,8 +377,8 @@ class CurveOrientation(Frozen, ShortRepr):
     turned : (k,) bool
         True for curves that were flipped.
     agreement : (k,) float
-        Fraction of each curve that bounds the region, from 0 to 1. Spurious strokes often have 0. It is 1 for points
-        and for curves that are never flipped.
+        Fraction of the length of each curve that bounds the region, from 0 to 1. Spurious strokes often have 0. It is 1
+        for points and for curves that are never flipped.
 
     See Also
     --------
@@ -387,10 +387,10 @@ class CurveOrientation(Frozen, ShortRepr):
 
     Examples
     --------
-    >>> from signedheat import samples
+    >>> from signedheat import orientation, samples
     >>> mesh = samples.sphere(3)
     >>> equator, = mesh.level_set(mesh.vertices[:, 2], 0.01)
-    >>> curve_orientation([equator], mesh).turned
+    >>> orientation([equator], mesh).turned
     array([False])
     """
 

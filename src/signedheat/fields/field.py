@@ -82,15 +82,16 @@ class Field(Displayed, Frozen, Generic[Domain]):
         φ, in the units of the domain: ``values[i, j, k]`` at ``grid.points[i, j, k]`` of a grid, (n_vertices,) on tets
         and surfaces, (n, 8, 8, 8) in the blocks of a band. Positive on the side that the normals of the source point
         to, so negative inside a shape with outward normals. NaN where no source is connected.
-    diagnostics : Diagnostics
-        Timings, diffusion time, and notes on the computation.
+    diagnostics : Diagnostics, optional
+        Timings, diffusion time, and notes on the computation; empty by default.
     confidence : array, optional
         Numbers from 0 to 1 in the shape of the values. They are 1 where the nearest surface point is given, and
-        smaller where it was completed, the farther it is from the given faces.
+        smaller where it was completed, the farther it is from the given faces. By default the field has none.
     solid : Solid, optional
-        The solid that the values are distances to. With it, calls, gradients and contours are exact.
+        The solid that the values are distances to. With it, calls, gradients and contours are exact. By default points
+        between the nodes get interpolated values.
     source : SourceTerm, optional
-        The source that a solver computed the field from; `sharpen` uses it.
+        The source that a solver computed the field from; `sharpen` uses it. By default it is not known.
     coarse : Field, optional
         φ on a coarse grid of the whole box, for points beyond a band. Every field in a band needs one.
     finer : Field, optional
@@ -460,7 +461,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Parameters
         ----------
         level : float
-            The value of φ on the level set, in the units of the domain.
+            The value of φ on the level set, in the units of the domain; by default 0, the surface itself.
 
         Returns
         -------
@@ -515,8 +516,9 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Returns
         -------
         TriangleMesh, list of Polyline or list of Curve
-            The level set φ = distance. If the field holds its solid and is not in a band, sharp edges and corners of
-            the offset are kept. Otherwise it is the result of `contour`.
+            The level set φ = distance: a mesh in space, polylines in the plane, or curves on a surface. If the field
+            holds its solid and is not in a band, sharp edges and corners of the offset are kept. Otherwise it is the
+            result of `contour`.
 
         Raises
         ------
@@ -553,8 +555,8 @@ class Field(Displayed, Frozen, Generic[Domain]):
         path : str or path
             A ``.ply`` file. An existing file is replaced only after the new one is complete.
         level : float
-            The value of φ on the level set, in the units of the domain. In bands, sharp creases are chamfered by the
-            cells.
+            The value of φ on the level set, in the units of the domain; by default 0, the surface itself. In bands,
+            sharp creases are chamfered by the cells.
 
         Returns
         -------

@@ -47,7 +47,7 @@ def sharpen(
     method: Method | None = None,
     progress: Progress | None = None,
 ) -> Field:
-    """Replace a field by the distance to its own zero set, or to what it was computed from.
+    """Replace a field φ by the distance to its own zero set, or to what it was computed from.
 
     This is Section 7.3 of the paper.
 
@@ -55,7 +55,7 @@ def sharpen(
     that holds the solid of `complete` is exact already, and stays so.
 
     On surfaces: exact geodesic distance on the polyhedral surface, up to a tolerance (`Geodesic`, the default). For
-    smooth curves on good triangles, such as a circle at ``t = h²``, mainly the largest errors become smaller. With a
+    smooth curves on good triangles, such as a circle, mainly the largest errors become smaller. With a
     `source`: exact distance to the curves and points themselves, however they cross the faces. In regions that curves
     bound, the curves decide the sign; elsewhere the field does, and its zero set replaces missing curves where it is
     farther from all curves than the size of a triangle, or begins at a free end of a curve.
@@ -74,11 +74,13 @@ def sharpen(
         From `signed_distance` or `SignedHeatSolver.distance`.
     source : curves and points, or meshes, optional
         What the field was computed from. On surfaces `Curve`, `SurfacePoints` or a sequence of them; on tets
-        `TriangleMesh`, `PolygonMesh` or a sequence of them, oriented, and without parts inside others.
+        `TriangleMesh`, `PolygonMesh` or a sequence of them, oriented, and without parts inside others. By default
+        distance is measured to the zero set of the field alone.
     method : Geodesic or Convex, optional
-        On surfaces and tets, without a source.
+        How to sharpen on surfaces and tets, if no source is given; `Geodesic` by default.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
 
     Returns
     -------

@@ -173,22 +173,26 @@ def complete(
     lids : {"bent", "flat"}
         Whether lids continue the curvature of the surface, or are flat, as for half models, ducts and hulls.
     as_oriented : bool
-        Keep the orientation of faces and normals.
+        Whether to keep the orientation of faces and normals. By default they are flipped where needed.
     keep_overlaps : bool
-        Keep surfaces that lie inside other bodies.
+        Whether to keep surfaces that lie inside other bodies. By default they are left out.
     nested : {"given", "cavities", "bodies"}
-        Whether closed parts within others are bodies or cavities. With "given", that depends on their orientation. With
-        "cavities", they are cavities, and parts within these are bodies, as in slicers. With "bodies", all are bodies.
+        Whether closed parts within others are bodies or cavities. With "given", a part is a body if it faces as the
+        part around does, and else a cavity. With "cavities", they are cavities, and parts within these are bodies, as
+        in slicers. With "bodies", all are bodies.
     seal : float, optional
         Seal openings of meshes that are narrower than this length, to about a sixth of it, and fill what lies behind
         them. Faces that are not reached from outside through wider openings, such as inner skins, are left out. In the
-        units of the shape, as all lengths.
+        units of the shape, as all lengths. By default nothing is sealed.
     smallest : float, optional
-        Leave out the connected parts of meshes that fit into a box whose diagonal is shorter than this length.
+        Leave out the connected parts of meshes that fit into a box whose diagonal is shorter than this length. By
+        default all parts are used.
     constraint, diffusion : Constraint, float
-        Options of the signed heat method, where the shape is completed by it; see `SignedHeatSolver`.
+        Options of the signed heat method, where the shape is completed by it, as for `SignedHeatSolver`. They are the
+        constraint on φ at the shape, by default `ZeroSet`, and the factor τ of the diffusion time, by default 1.
     progress : callable, optional
-        Called as ``progress(fraction, step)``, ten times a second. An exception that it raises cancels.
+        Called ten times a second as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of
+        the step that runs. An exception that it raises cancels.
 
     Returns
     -------

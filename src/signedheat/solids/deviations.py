@@ -118,7 +118,7 @@ class Deviation(Frozen):
         Returns
         -------
         float
-            From 0 to 1.
+            Share of the points, from 0 to 1.
 
         See Also
         --------
@@ -140,7 +140,7 @@ class Deviation(Frozen):
         Parameters
         ----------
         percents : (k,) float
-            From 0 to 100.
+            Percentages from 0 to 100. By default 0, 1, 5, 25, 50, 75, 95, 99 and 100.
 
         Returns
         -------
@@ -301,7 +301,8 @@ def deviation(
     nominal : shape or Solid
         The part as it should be. Unless it is a solid, it is completed first.
     progress : callable, optional
-        Called as ``progress(fraction, step)``. An exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
 
     Returns
     -------

@@ -106,9 +106,10 @@ def fill_holes(
     mesh : TriangleMesh or PolygonMesh
         Any mesh.
     largest : float, optional
-        Boundary loops longer than this stay open, in the units of the mesh.
+        Boundary loops longer than this stay open, in the units of the mesh. By default all holes are closed.
     rims : int or sequence of int, optional
-        Close only the boundary loops through these vertices, even if they are outlines of sheets.
+        Close only the boundary loops through these vertices, even if they are outlines of sheets. By default all holes
+        are closed.
     lids : {"bent", "flat"}
         Whether patches continue the curvature of the surface, or are flat, as in `complete`.
 
@@ -116,8 +117,9 @@ def fill_holes(
     -------
     FilledMesh or FilledPolygonMesh
         A `TriangleMesh`, or a `PolygonMesh` of a mesh of polygons, with three more attributes. ``origins``, (m,) int,
-        is the number of each face in the given mesh, −1 for new ones. ``filled`` and ``left`` are the vertices of each
-        boundary loop that was closed, and of each that is still open.
+        is the number of each face in the given mesh, −1 for new ones. ``filled`` is a sequence
+        of arrays, (k,) int, with the vertices of each boundary loop that was closed, and ``left`` one of those of each
+        that is still open.
 
     Raises
     ------

@@ -146,13 +146,14 @@ def contour(
     Parameters
     ----------
     f : callable, or (nx, ny, nz) float
-        A function that returns one number for each of (n, 3) points; or values at the nodes of a grid.
+        A function that takes (n, 3) points and returns (n,) numbers; or values at the nodes of a grid.
     bounds : (2, 3) float
         Lower and upper corner of the box. For an array, the positions of its first and last nodes.
     spacing : float or (3,) float, optional
-        Size of the cells in which a function is sampled. An array has its own.
+        Size of the cells in which a function is sampled, in units of length; by default that of `resolution`. The cells
+        of an array follow from `bounds`.
     level : float
-        Value of the function, or of the array, on the surface.
+        Value of the function, or of the array, on the surface; 0 by default.
     sharp : bool
         Use dual contouring; otherwise marching cubes, which cut edges off.
     gradient : callable, or (nx, ny, nz, 3) float, optional

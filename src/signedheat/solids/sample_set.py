@@ -88,7 +88,12 @@ class Samples:
 
     @property
     def figures(self) -> dict[str, float | list[float]]:
-        """A summary of the samples, ready for JSON."""
+        """A summary of the samples by name, ready for JSON.
+
+        "samples" is the number of points, and "near" that of those sampled near the surface. "inside_share" and
+        "completed_share" are the shares of points, from 0 to 1, that are inside, and whose nearest point lies on the
+        completion. "center" and "radius" are those of the shape.
+        """
         return {
             "samples": len(self.points),
             "near": int(self.near.sum()),

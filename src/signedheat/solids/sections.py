@@ -62,7 +62,7 @@ class Section(Frozen):
 
     @property
     def in_space(self) -> list[Floats]:
-        """(n, 3) points of each outline, and then of each sheet, in space."""
+        """List of the (n, 3) points in space of each outline, and then of each line on sheets."""
         return [line.points @ self.matrix[:3, :2].T + self.matrix[:3, 3] for line in (*self.outlines, *self.sheets)]
 
     def __repr__(self) -> str:

@@ -344,7 +344,8 @@ class Solid(Displayed, Represented, Frozen):
             What computes the tiles of a store: a pool, such as a `ProcessPoolExecutor`, or a Dask cluster, by its
             client or its address, such as ``"tcp://127.0.0.1:8786"``. By default, threads of this process.
         progress : callable, optional
-            Called as ``progress(fraction, step)``. An exception that it raises cancels.
+            Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+            begins. An exception that it raises cancels.
 
         Returns
         -------
@@ -427,7 +428,8 @@ class Solid(Displayed, Represented, Frozen):
             Simplify the surface with manifold3d: no point of either surface is farther than this from the other. If
             manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
         progress : callable, optional
-            Called as ``progress(fraction, step)``. An exception that it raises cancels.
+            Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+            begins. An exception that it raises cancels.
 
         Returns
         -------
@@ -501,18 +503,19 @@ class Solid(Displayed, Represented, Frozen):
             Distance of the surface from the solid, positive outside, in the units of the shape; see
             `signedheat.offset` for arrays and functions.
         corners : "round", "mitre" or "sharp"
-            Shape of edges that the surface moves away from.
+            Shape of edges where offset faces move apart, as for `signedheat.offset`; by default they are rounded.
         resolution : int
             Number of nodes along the longest side of the grid.
         spacing : float or (3,) float, optional
             Distance between nodes, in place of `resolution`.
         progress : callable, optional
-            Called as ``progress(fraction, text)``.
+            Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+            begins. An exception that it raises cancels.
 
         Returns
         -------
         TriangleMesh
-            Closed and manifold.
+            The surface, closed and manifold, with normals that point away from the inside.
 
         Raises
         ------

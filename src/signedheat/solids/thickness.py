@@ -128,7 +128,7 @@ class Thickness(Frozen):
         Returns
         -------
         float
-            From 0 to 1.
+            Share of the area, from 0 to 1.
 
         See Also
         --------
@@ -149,12 +149,12 @@ class Thickness(Frozen):
         Parameters
         ----------
         percents : (k,) float
-            From 0 to 100.
+            Percentages from 0 to 100.
 
         Returns
         -------
         (k,) float
-            Lengths, in the units of the solid.
+            Thickness that this percentage of the area does not exceed, in the units of the solid.
 
         Raises
         ------
@@ -224,7 +224,7 @@ def wall_thickness(shape: ShapeLike, *, resolution: int = 64) -> Thickness:
     shape : shape or Solid
         A shape, broken or not; completed here unless it is a solid.
     resolution : int
-        Squares along the longest side of the box around the solid; faces larger than half of one are cut.
+        Number of squares along the longest side of the box around the solid; faces larger than half a square are cut.
 
     Returns
     -------

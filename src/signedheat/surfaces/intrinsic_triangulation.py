@@ -471,7 +471,8 @@ def intrinsic_delaunay(
         mean area that there would be otherwise, and at least 1. Flat parts of CAD meshes, which have no small angles,
         then become about as fine as the rest.
     progress : callable, optional
-        Called as ``progress(fraction, step)``; an exception that it raises cancels.
+        Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
+        begins. An exception that it raises cancels.
 
     Returns
     -------
