@@ -35,7 +35,8 @@ def distance(solid: Solid, points: Tensor, vertices: Tensor | None = None) -> Te
     points : (..., 3) tensor
         Positions in the units of the solid, on any device.
     vertices : (k, 3) tensor, optional
-        Vertices of the mesh that was completed, if derivatives with respect to them are wanted.
+        Vertices of the mesh that was completed, if derivatives with respect to them are wanted. By default only the
+        points have derivatives.
 
     Returns
     -------

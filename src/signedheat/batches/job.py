@@ -97,19 +97,22 @@ class Job:
     Attributes
     ----------
     volume : str, optional
-        Extension of the file of the field, such as ``".npz"``.
+        Extension of the file of the field, such as ``".npz"``. By default the field is not written.
     offsets : tuple of float
-        Distances at which to write closed surfaces, such as ``NAME_+0.5.stl``.
+        Signed distances, in the units of the shape, at which to write closed surfaces, such as ``NAME_+0.5.stl``.
+        By default none is written.
     surfaces : str
         Extension of the files of these surfaces.
     samples : Sampling, optional
-        Training points, written to ``NAME.npz``, or to ``NAME_samples.npz`` if ``NAME.npz`` is the field.
+        Training points, written to ``NAME.npz``, or to ``NAME_samples.npz`` if ``NAME.npz`` is the field. By default
+        none are drawn.
     info : bool
         Whether to report counts and defects of the shape in the manifest, as ``signedheat info`` does.
     resolution, spacing, padding
         The grid around each shape, as for `signed_distance`, by default with room for the offsets.
     band : float, optional
-        Half width of a band, outside of which the grid is coarse, as for `signed_distance`.
+        Half width of a band, in the units of the shape, outside of which the grid is coarse, as for `signed_distance`.
+        By default the whole grid is fine.
     completion, constraint, diffusion, as_oriented, keep_overlaps, lids, nested
         How shapes are completed, as for `signed_distance`.
     plain : bool
@@ -287,7 +290,7 @@ class Watertight:
         Extension of the files.
     thickness : float, optional
         Thickness of the solid around sheets, which bound nothing themselves. The surface is at half this distance from
-        the shape.
+        the shape. By default a shape that is only a sheet is refused.
     contoured : bool
         Whether to contour the whole surface, which gives more and evenly sized triangles.
     tolerance : float, optional
@@ -296,21 +299,23 @@ class Watertight:
         The grid on which to contour the whole surface, as in `Solid.surface`. By default faces are kept, or with
         `contoured` or `thickness` there are 256 nodes along the longest side.
     seal : float, optional
-        Width below which openings are sealed, and what lies behind them is filled, as in `complete`.
+        Width below which openings are sealed, and what lies behind them is filled, as in `complete`. By default
+        none is.
     smallest : float, optional
-        Length below which connected parts are left out, as in `complete`.
+        Length of the diagonal of their box below which connected parts are left out, as in `complete`. By
+        default none is.
     samples : int, optional
-        Number of training points of each kind, in two files that public shape generators read: ``_surface.npz`` with
-        positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with points in the volume,
-        near the surface and near sharp edges, and their signed distances.
+        Number of training points of each kind, by default none, in two files that public shape generators read:
+        ``_surface.npz`` with positions and normals in ``random_surface`` and ``sharp_surface``, and ``_sdf.npz`` with
+        points in the volume, near the surface and near sharp edges, and their signed distances.
     normalize : bool
         Whether to move and scale the samples so that the shape lies in the unit sphere.
     label : float, optional
-        The label of the voxels whose surface is written, if the file is an image of labels. It has the coordinates of
-        the image.
+        The label of the voxels whose surface is written, if the file is an image of labels; by default its only label
+        other than 0. The surface is placed in the world of the image.
     units : str, optional
-        Unit of all lengths, such as ``"mm"``. Files that state another unit are scaled to it. Those that state none
-        are assumed to be in it already, or, with ``"inch:mm"``, in inches.
+        Unit of all lengths, such as ``"mm"``; by default that of each file. Files that state another unit are scaled to
+        it. Those that state none are assumed to be in it already, or, with ``"inch:mm"``, in inches.
 
     See Also
     --------

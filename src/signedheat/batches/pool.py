@@ -349,17 +349,17 @@ def run(
     workers : int, optional
         Number of processes. By default, one for each processor.
     threads : int
-        Threads of each process.
+        Number of threads of each process, 1 by default.
     scheduler : str, optional
         Address of a running Dask cluster, such as ``tcp://host:port``, which runs the job instead of this machine. Its
-        workers must see the same files at the same paths.
+        workers must see the same files at the same paths. By default the job runs in processes of this machine.
     time_limit : float, optional
-        Seconds after which a shape is abandoned.
+        Seconds after which a shape is abandoned. By default there is no limit.
     progress : callable, optional
         Called as ``progress(fraction, text)`` with the fraction of shapes done, from 0 to 1, and a line that says how
         many. An exception that it raises stops the batch.
     report : callable, optional
-        Called with the `Outcome` of each shape as soon as it ends.
+        Called as ``report(outcome)`` with the `Outcome` of each shape as soon as it ends.
 
     Returns
     -------

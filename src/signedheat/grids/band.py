@@ -36,7 +36,7 @@ class Band(Grid[Literal[3]]):
     blocks : Blocks
         The n blocks that have values.
     width : float
-        Half width: all nodes with values up to this on either side of 0 are in the band.
+        Half width, in the units of the grid: all nodes with values up to this on either side of 0 are in the band.
 
     Raises
     ------

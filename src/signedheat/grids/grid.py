@@ -130,7 +130,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         bounds : shape, sequence of shapes, or (2, d) float
             A shape or several, or the lower and upper corner of a box.
         resolution : int
-            Number of nodes along the longest side; all axes have the same spacing.
+            Number of nodes along the longest side, 128 by default; all axes have the same spacing.
         padding : float, optional
             Least distance between the box and the boundary of the grid; a fifth of the longest side by default.
         spacing : (d,) float or float, optional
@@ -196,7 +196,7 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
 
     @cached_property
     def axes(self) -> tuple[Floats, ...]:
-        """Coordinates of the nodes along each axis."""
+        """Tuple of the coordinates of the nodes along each axis, one array (n,) for the n nodes of an axis."""
         return tuple(
             frozen(o + s * np.arange(n)) for o, s, n in zip(self.origin, self.spacing, self.shape, strict=True)
         )

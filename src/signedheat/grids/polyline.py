@@ -82,7 +82,8 @@ class Polyline(Displayed, Frozen):
         mask : (nx, ny) bool
             ``mask[i, j]`` is at ``origin + (i, j) * spacing``, as on a `Grid`; outside the image it counts as False.
         origin, spacing : (2,) float
-            Position of the first pixel, and distance between pixels.
+            Position of the first pixel, and distance between pixels along each axis, in units of length; 0 and 1 by
+            default.
 
         Returns
         -------

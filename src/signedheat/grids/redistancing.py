@@ -50,9 +50,9 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
     values : array with one to four axes
         Values at the nodes of a grid: positive on one side, negative on the other, and 0 on the zero set.
     spacing : float, or one for each axis
-        Distance between neighbouring nodes, in units of length.
+        Distance between neighbouring nodes, in units of length; 1 by default.
     periodic : bool, or one for each axis
-        Whether the first node follows the last one along an axis.
+        Whether the first node follows the last one along an axis. By default it does not.
 
     Returns
     -------

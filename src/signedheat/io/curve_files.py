@@ -59,7 +59,8 @@ def read_curves(path: PathLike, domain: EmbeddedSurface | ForeignShape, strict: 
     domain : TriangleMesh, PolygonMesh, PointCloud or DigitalSurface
         The surface that the ids refer to.
     strict : bool
-        Refuse curves with consecutive points that share no face, which are otherwise joined by geodesic paths.
+        Whether to refuse curves with consecutive points that share no face. By default these are joined by geodesic
+        paths.
 
     Returns
     -------

@@ -71,10 +71,25 @@ def write_field(field: Field[Any], path: PathLike) -> None:
 
 
 def save_field(field: Field[Any], path: PathLike) -> None:
-    """Write a field on a grid, in the format given by the extension.
+    """Write a field on a grid or in a band, in the format given by the extension.
 
-    ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of the
-    same name next to it, ``.vdb`` (OpenVDB; single precision; not read back).
+    Parameters
+    ----------
+    field : Field
+        A field on a grid, or in a band of one.
+    path : str or path
+        ``.npz`` (NumPy), ``.vti`` (VTK, ParaView), ``.nrrd`` (3D Slicer, medical imaging), ``.npy`` with a ``.json`` of
+        the same name next to it, or ``.vdb`` (OpenVDB, in single precision, which is not read back). For bands
+        ``.npz``, ``.vti`` or ``.vdb``. The file is replaced only after the new one is complete.
+
+    Raises
+    ------
+    FileFormatError
+        If the field is not on a grid, the format is unknown or does not support it, or the file cannot be written.
+
+    See Also
+    --------
+    Field.save : The same for fields on any domain.
     """
     if not isinstance(field.domain, Grid):
         raise FileFormatError(f"the field lies on a {type(field.domain).__name__}, not on a grid", path=path)

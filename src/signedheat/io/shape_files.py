@@ -105,8 +105,9 @@ def read(path: PathLike) -> Shape | Solid:
     Returns
     -------
     TriangleMesh, PolygonMesh, PointCloud, DigitalSurface, TetMesh or Solid
-        A triangle mesh if all faces are triangles, a polygon mesh if others are, and a point cloud without faces. A
-        volume of voxels becomes its boundary, a `DigitalSurface`.
+        A triangle mesh if all faces are triangles, a polygon mesh if some are not, and a point cloud without faces. A
+        volume of voxels becomes its boundary, a `DigitalSurface`. A file of tets becomes a `TetMesh`, and one of a
+        solid, or of a field that has one, the `Solid`.
 
     Raises
     ------

@@ -66,7 +66,7 @@ def write_vdb(field: Field[Grid], path: PathLike, half: bool = False) -> None:
     path : str or path
         The file; written under a temporary name and renamed.
     half : bool
-        Store values in 16 bits, with about three digits.
+        Whether to store values in 16 bits, with about three digits. By default they have 32 bits.
 
     Raises
     ------

@@ -358,7 +358,7 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
     level : float, optional
         Voxels with values above it are inside. If it is not given, the image must have booleans, or zeros and ones.
     radius : float, optional
-        Radius within which normals are estimated, in the units of the file, as for `DigitalSurface`.
+        Radius within which normals are estimated, in the units of the file, by default as for `DigitalSurface`.
 
     Returns
     -------

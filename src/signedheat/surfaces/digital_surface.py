@@ -46,9 +46,9 @@ class DigitalSurface(Displayed, Surface):
     volume : (nx, ny, nz) bool
         True inside. Everything beyond the array is outside.
     spacing : float or (3,) float
-        Edge lengths of a voxel.
+        Edge lengths of a voxel along each axis, in units of length; 1 by default.
     origin : (3,) float
-        Position of the centre of voxel ``(0, 0, 0)``.
+        Position of the centre of voxel ``(0, 0, 0)``; zero by default.
     radius : float, optional
         Radius, in units of length, of the neighbourhood over which normals are estimated; with 0 every face has its own
         normal. Small radii keep details, large ones remove the staircase. By default 0.4 · √(voxel size · extent of the

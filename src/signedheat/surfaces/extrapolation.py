@@ -22,13 +22,14 @@ FINE_EXTENT = 263.0
 class Extrapolated:
     """Directions extrapolated from one diffusion time and from how they change with it: the default on surfaces.
 
+    Normals of the source are diffused like heat for a time ``t = τ h²``, with h the mean distance between unknowns.
     Heat falls by the factor e within √t. At τ = 1 that is about a cell, which the cells do not resolve. So directions
     keep an error of the size h²/t, which does not fall as the cells get smaller. A larger τ smooths the source, with an
     error of the size √t. Both errors cancel in a combination of the directions Y and their first two derivatives by t.
     On triangles the error then falls about like their size, and is less than half as large on fine meshes; on the
     coarsest there is little to gain. The derivatives need no other matrix: the linear system of step 1 is factorised
-    once, and solved three times. By default τ is 3 up to about 20,000 vertices, and beyond grows with the fifth root of
-    their number.
+    once, and solved three times. `SignedHeatSolver` by default takes a τ of 3 up to about 20,000 vertices, and beyond
+    one that grows with the fifth root of their number.
 
     Where an oriented curve ends, away from the boundary of the surface, heat completes it, and Y depends on t by more
     than an error. In that connected part of the surface the directions of τ/3 are used unchanged.
@@ -36,7 +37,7 @@ class Extrapolated:
     Parameters
     ----------
     tau : float
-        τ in ``t = τ h²``.
+        Factor τ of the time ``t = τ h²``, from which directions are extrapolated; 3 by default.
 
     Raises
     ------

@@ -295,7 +295,7 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         values : (n_vertices,) float
             The function at the vertices of the triangulation.
         level : float
-            The level, in the units of the function.
+            The level, in the units of the function; 0 by default.
 
         Returns
         -------
@@ -370,7 +370,8 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
         Returns
         -------
         CurveSegments or list of CurveSegments
-            Segments, each within one triangle of the triangulation.
+            Segments, each within one triangle of the triangulation: one `CurveSegments` for a single curve, points or
+            a list of (element, coordinates), and a list of them for a sequence.
 
         See Also
         --------
@@ -453,23 +454,24 @@ def intrinsic_delaunay(
     ----------
     mesh : TriangleMesh
         The surface.
-    keep : Curve, SurfacePoints or a sequence of them
+    keep : Curve, SurfacePoints or a sequence of them, optional
         Curves that are to run along edges, and points that are to be vertices. Points of curves become vertices where
         curves bend, end or meet. Or lists of (element, barycentric coordinates), as for `signed_distance`. Curves
         without length are left out if there are others. Distance can be measured to other sources as well.
     refine : bool
-        Insert vertices until no angle is smaller than `angle`. Smaller ones remain where boundaries or kept curves meet
-        at less than 60°, at vertices with a total angle of less than 60°, and at groups of vertices that nearly
-        coincide (of a size less than a hundredth of the distance to any other vertex), since grading the triangles
-        towards them takes hundreds of vertices and gains no accuracy. `IntrinsicTriangulation.summary` reports them.
+        Whether to insert vertices until no angle is smaller than `angle`. By default edges are only flipped. Smaller
+        ones remain where boundaries or kept curves meet at less than 60°, at vertices with a total angle of less than
+        60°, and at groups of vertices that nearly coincide (of a size less than a hundredth of the distance to any
+        other vertex), since grading the triangles towards them takes hundreds of vertices and gains no accuracy.
+        `IntrinsicTriangulation.summary` reports them.
     angle : float
-        Minimum angle in degrees, at most 30.
+        Minimum angle of refinement in degrees, at most 30; 28 by default.
     max_vertices : int, optional
         Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
     coarsest : float
-        Triangles with a larger circumradius are split, too. It is relative to that of an equilateral triangle with the
-        mean area that there would be otherwise, and at least 1. Flat parts of CAD meshes, which have no small angles,
-        then become about as fine as the rest.
+        In refinement, triangles with a larger circumradius are split, too; by default none is for its size. It is
+        relative to that of an equilateral triangle with the mean area that there would be otherwise, and at least 1.
+        Flat parts of CAD meshes, which have no small angles, then become about as fine as the rest.
     progress : callable, optional
         Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
         begins. An exception that it raises cancels.

@@ -47,12 +47,13 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
     points : (n, d) float
         Positions.
     normals : (n, d) float, optional
-        Directions pointing out of the shape, of any length but 0; they are scaled to length 1.
+        Directions pointing out of the shape, of any length but 0; they are scaled to length 1. By default the cloud
+        has none, and `complete` fits them.
     areas : (n,) float, optional
         Surface area that each point represents, in square units. If absent, estimated from neighbours when needed.
     n_neighbors : int
         Number of nearest points to which tangent planes are fitted and with which triangles are made, when distance is
-        measured on the cloud.
+        measured on the cloud; 30 by default.
 
     Raises
     ------

@@ -121,7 +121,7 @@ class PolygonMesh(Exchangeable[NoReturn], Surface):
 
     @property
     def polygons(self) -> list[Ints]:
-        """Vertex ids of each polygon."""
+        """List of the (k,) vertex ids of each polygon."""
         return np.split(self.corners, self.offsets[1:-1])
 
     @cached_property

@@ -418,7 +418,7 @@ class Surface(Frozen, LinearDomain):
         values : (n_vertices,) float
             The function at the vertices, linear in each triangle. Faces with a NaN corner are skipped.
         level : float
-            The level, in the units of the function.
+            The level, in the units of the function; 0 by default.
 
         Returns
         -------

@@ -16,7 +16,7 @@ from ..validation import array_of, finite_rows, flag, frozen, whole_numbers
 
 @dataclass(frozen=True, eq=False)
 class Curve(Frozen):
-    """A polyline on a surface; φ > 0 to its left if it is oriented.
+    """A polyline on a surface. If it is oriented, φ, the signed distance to it, is positive to its left.
 
     Left is the direction of the curve rotated by 90° counter-clockwise, as seen with the face normal towards you. For a
     segment along an edge it is left in the first face at that edge. Where faces are not consistently oriented, left is
@@ -31,9 +31,10 @@ class Curve(Frozen):
     barycentric : (n, 3) float
         Barycentric coordinates in that face: weights of its three corners, which add up to 1.
     closed : bool
-        Whether the last point is joined to the first.
+        Whether the last point is joined to the first. By default the curve is open.
     oriented : bool
-        Whether the curve has a positive and a negative side; distance to an unoriented curve is unsigned.
+        Whether the curve has a positive and a negative side, as it has by default. Distance to an unoriented curve is
+        unsigned.
     normals : (segments, 3) float, optional
         Direction in space in which φ grows across each segment. Needed where left has no meaning: for curves along
         which a surface that is not orientable loses its orientation, and for curves in several parts of a surface that

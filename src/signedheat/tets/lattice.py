@@ -49,12 +49,12 @@ def tetrahedralize(
     shape : TriangleMesh, PolygonMesh or PointCloud
         Any shape, however broken.
     resolution : int
-        Number of cells near the shape along the longest side of its box.
+        Number of cells near the shape along the longest side of its box; 32 by default.
     padding : float, optional
         Least distance between shape and box, in the units of the shape; by default a fifth of its longest side.
     grading : float
-        Cells are no larger than their distance from the shape divided by `grading`, which is at least 2.7. ``inf``
-        gives a uniform lattice.
+        Away from the shape, cells are no larger than their distance from it divided by `grading`, which is at least 2.7
+        and by default 3. ``inf`` gives a uniform lattice.
 
     Returns
     -------

@@ -167,7 +167,7 @@ class TetMesh(Displayed, Frozen, FieldDomain):
 
     @classmethod
     def from_meshio(cls, mesh: meshio.Mesh) -> TetMesh:
-        """Convert the tets of a mesh of meshio; its faces, lines and vertices are left out.
+        """Convert the tets of a mesh of meshio; its polygons, lines and vertex cells (single points) are left out.
 
         Parameters
         ----------

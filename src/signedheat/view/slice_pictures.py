@@ -41,8 +41,9 @@ def save_slices(
 ) -> None:
     """Write a picture of three orthogonal slices through a field.
 
-    Each slice is where its area inside is largest. Blue is inside, orange outside, and grey without a value. The black
-    line is φ = 0, dashed where the surface was completed, and the shape is red. A field in the plane is drawn whole.
+    Each slice is where its area inside is largest. Blue is inside, orange outside, and grey without a value. Of the
+    field φ, the black line is φ = 0, dashed where the surface was completed, and the shape is red. A field in the plane
+    is drawn whole.
 
     Parameters
     ----------
@@ -51,9 +52,10 @@ def save_slices(
     path : str or path
         The file, in the format ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     shape : a shape, optional
-        The shape to which φ is the distance, to be drawn too. In the plane, a `Polyline` or a sequence of them.
+        The shape to which the field is the distance, to be drawn too; by default none is. In the plane, a `Polyline` or
+        a sequence of them.
     levels : sequence of float
-        Further values of φ whose level sets are drawn, with heavier lines than the isolines.
+        Further values of the field whose level sets are drawn, with heavier lines than the isolines; none by default.
 
     Raises
     ------
@@ -94,11 +96,11 @@ def draw_slices(
     axes : sequence of Matplotlib axes
         The axes of a figure, one for each slice.
     shape : a shape, optional
-        A shape whose section with each slice is drawn in red.
+        A shape whose section with each slice is drawn in red; by default none is.
     levels : sequence of float
-        Further values of φ whose level sets are drawn, with heavier lines than the isolines.
+        Further values of the field whose level sets are drawn, with heavier lines than the isolines; none by default.
     across : sequence of int
-        The axis normal to each slice: 0, 1 or 2.
+        The axis normal to each slice: 0, 1 or 2. By default the slices lie across z, y and x.
     """
     field = field.coarse or field
     colors, isolines, step = _colors_and_isolines(field)
@@ -148,7 +150,7 @@ def draw_plane(field: Field[Grid], axes: Axes, shape: SpaceSources | None = None
     shape : Polyline, PointCloud or a sequence of them, optional
         What is drawn in red on top; other shapes are left out.
     levels : sequence of float
-        Further values of φ whose level sets are drawn, with heavier lines than the isolines.
+        Further values of the field whose level sets are drawn, with heavier lines than the isolines; none by default.
     """
     colors, isolines, step = _colors_and_isolines(field)
     u, v = field.domain.axes

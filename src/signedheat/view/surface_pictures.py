@@ -233,11 +233,11 @@ def draw_shape(
     axes : Matplotlib axes
         Where to draw it.
     view : (elevation, azimuth)
-        The direction to the eye in degrees.
+        The direction to the eye in degrees; by default from slightly above.
     up : int
         The axis that points up in the picture: 0, 1 or 2.
     colors : (m, 3) float, optional
-        Colours of the faces of a triangle mesh, red, green and blue from 0 to 1.
+        Colours of the faces of a triangle mesh, red, green and blue from 0 to 1. By default outer sides are light.
     """
     shape = outside_of(shape)
     direction = oblique(*view, up)
@@ -296,7 +296,7 @@ def save_surface(
     n_contours: int = 20,
     up: int = 2,
 ) -> None:
-    """Write a picture of a surface coloured by φ, with isolines, seen from a side that shows the sources.
+    """Write a picture of a surface coloured by a field φ, with isolines, seen from a side that shows the sources.
 
     Blue is φ < 0, orange φ > 0, the heavy line is φ = 0, and sources are yellow.
 
@@ -307,11 +307,11 @@ def save_surface(
     path : str or path
         The file, in the format ``.png``, ``.pdf``, ``.svg`` or ``.jpg``.
     sources : Curve, SurfacePoints or a sequence of them
-        The sources to draw.
+        The sources to draw; none by default.
     n_contours : int
-        The approximate number of isolines; 0 for none.
+        The approximate number of isolines, 20 by default; 0 for none.
     up : int
-        Axis that points upwards: 0, 1 or 2.
+        The axis that points up in the picture: 0, 1 or 2.
 
     Raises
     ------
@@ -345,9 +345,9 @@ def draw_surface(
     axes : Matplotlib axes
         Where to draw it.
     sources : Curve, SurfacePoints or a sequence of them
-        The sources to draw, in yellow.
+        The sources to draw, in yellow; none by default.
     n_contours : int
-        The approximate number of isolines; 0 for none.
+        The approximate number of isolines, 20 by default; 0 for none.
     view : (3,) float, optional
         The direction from the surface to the eye; by default a side that shows the sources.
     up : int
