@@ -80,10 +80,10 @@ def piecewise_distance(
     -----
     Let Y be the diffused and normalised source normals. First, φ is the function with gradient Y in every triangle
     that minimises ``Σ_e |e| exp(−κ_e) (|jump at one end of e| + |jump at the other|)`` over all edges e, where κ_e is
-    the difference between the components of Y along e in the two faces at e (Eq. 15, Eq. 16). The length of e is |e|.
-    Edges at the source have 100 times the weight, which keeps the cut away from the source. Second, the surface is cut
-    open along the lines of large jumps, and step 3 of the method (Eq. 13) makes φ continuous on it, with gradients near
-    Y.
+    the difference between the components of Y along e in the two faces at e (Eq. 15, Eq. 16). The length of e is
+    ``|e|``. Edges at the source have 100 times the weight, which keeps the cut away from the source. Second, the
+    surface is cut open along the lines of large jumps, and step 3 of the method (Eq. 13) makes φ continuous on it, with
+    gradients near Y.
 
     Without a cut, φ differs from `SignedHeatSolver.distance` by at most ``integration_error / √λ`` in the root mean
     square, where the note `diagnostics.Jumps` has the ``integration_error``, and λ is the least positive eigenvalue of

@@ -469,9 +469,9 @@ def intrinsic_delaunay(
     max_vertices : int, optional
         Limit on the number of vertices; by default 20 for every vertex of the mesh and the kept curves, plus 10,000.
     coarsest : float
-        In refinement, triangles with a larger circumradius are split, too; by default none is for its size. It is
-        relative to that of an equilateral triangle with the mean area that there would be otherwise, and at least 1.
-        Flat parts of CAD meshes, which have no small angles, then become about as fine as the rest.
+        Circumradius above which refinement splits triangles; infinite by default, so that their size does not matter.
+        It is relative to that of an equilateral triangle with the mean area that there would be otherwise, and at least
+        1. Flat parts of CAD meshes, which have no small angles, then become about as fine as the rest.
     progress : callable, optional
         Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
         begins. An exception that it raises cancels.
