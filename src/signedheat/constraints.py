@@ -18,7 +18,7 @@ __all__ = ["Constraint", "EachComponent", "Free", "LevelValues", "Soft", "ZeroSe
 
 @runtime_checkable
 class Constraint(Protocol):
-    """Protocol of constraints on φ. A constraint solves step 3 of the method, the integration of unit vectors.
+    """Protocol of constraints on the signed distance φ. They solve step 3 of the method, which integrates unit vectors.
 
     See Also
     --------
@@ -70,7 +70,9 @@ class Constraint(Protocol):
 
 @dataclass(frozen=True)
 class Free(Constraint):
-    """No constraint: φ solves Eq. 13 and is shifted so that its weighted mean over the source is zero.
+    """No constraint on the signed distance φ: it solves Eq. 13, shifted so that its mean over the source is zero.
+
+    The mean is weighted by the length or area of the source.
 
     See Also
     --------
@@ -89,7 +91,7 @@ class Free(Constraint):
 
 @dataclass(frozen=True)
 class ZeroSet(Constraint):
-    """Impose φ = 0 on the source, so that it lies in the zero set (Eq. 14). This is the default.
+    """Impose that the signed distance φ is 0 on the source, so that it lies in the zero set (Eq. 14), the default.
 
     Parameters
     ----------
@@ -121,7 +123,9 @@ class ZeroSet(Constraint):
 
 @dataclass(frozen=True)
 class EachComponent(Constraint):
-    """Impose that φ is constant on each connected component of the source, at an unknown level (Eq. 14, Fig. 10).
+    """Impose that the signed distance φ is constant on each component of the source (Eq. 14, Fig. 10).
+
+    Components are connected parts of the source. Their levels are unknown.
 
     Parameters
     ----------
@@ -148,7 +152,9 @@ class EachComponent(Constraint):
 
 @dataclass(frozen=True, repr=False)
 class LevelValues(ShortRepr, Constraint):
-    """Impose φ = ``values[k]`` on the k-th source, as for contour lines of a map (Eq. 14 with ``A φ = c``).
+    """Impose that the signed distance φ is ``values[k]`` on the k-th source, as for contour lines of a map.
+
+    This is Eq. 14 with ``A φ = c``, where A interpolates φ at samples of the source, and c are their levels.
 
     Parameters
     ----------
@@ -204,7 +210,9 @@ class LevelValues(ShortRepr, Constraint):
 
 @dataclass(frozen=True)
 class Soft(Constraint):
-    """Add a penalty on the square of φ at the source, between `Free` and ``ZeroSet(hard=True)`` (Fig. 11).
+    """Add a penalty on the square of the signed distance φ at the source (Fig. 11).
+
+    The result lies between those of `Free` and ``ZeroSet(hard=True)``.
 
     Parameters
     ----------

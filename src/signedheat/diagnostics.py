@@ -58,9 +58,9 @@ class Diagnostics(ShortRepr):
     timings : mapping of str to float
         Seconds that each step took, by the name of the step.
     time : float
-        Diffusion time t, in squared units of length.
+        Time for which normals of the source were diffused like heat, in squared units of length; NaN if none were.
     unreached : (k,) int
-        Ids of the unknowns that are connected to no source, at which φ is NaN.
+        Ids of the unknowns that are connected to no source, at which the field is NaN.
     notes : tuple of Note
         Notes such as on faces that were flipped, sources that were left out, or residuals. `note` finds one by its
         type.

@@ -93,11 +93,11 @@ class SignedHeatError(ValueError):
     cause : str
         What is wrong.
     remedy : str, optional
-        What to do about it, unless the cause says so.
+        What to do about it; None by default, if the cause says so.
     element : str, optional
-        The part of the input concerned, such as ``face 3``.
+        The part of the input concerned, such as ``face 3``; None by default.
     path : str, optional
-        The file concerned.
+        The file concerned; None by default.
 
     See Also
     --------

@@ -382,11 +382,11 @@ def offset(
         offset planes of the faces are extended, up to twice the distance with "mitre", which keeps the edges of boxes,
         or up to ten times with "sharp".
     resolution : int
-        Number of nodes along the longest side of the grid on which the surface is found. It lies around the box of the
-        completed shape, grown by the largest distance, with a fifth of the longest side as padding. With "mitre" and
-        "sharp", its cells have the same size, and it has room for the longest mitres instead.
+        Number of nodes along the longest side of the grid on which the surface is found, 128 by default. It lies around
+        the box of the completed shape, grown by the largest distance, with a fifth of the longest side as padding. With
+        "mitre" and "sharp", its cells have the same size, and it has room for the longest mitres instead.
     spacing : float or (3,) float, optional
-        Size of the grid's cells, in the units of the shape, in place of `resolution`.
+        Size of the grid's cells, in the units of the shape; by default it follows from `resolution`.
     progress : callable, optional
         Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
         begins. An exception that it raises cancels.
@@ -472,7 +472,7 @@ def shell(
         If true, which needs ``outer=0``, the outer side consists of the faces of the shape and of its completion.
     drain : float, optional
         Diameter of a hole, in the units of the shape, from the bottom of the largest cavity straight down (−z). It
-        lets liquids and powder out.
+        lets liquids and powder out. By default there is no hole.
 
     Returns
     -------
@@ -568,8 +568,8 @@ def thicken(
         The side to thicken if `below` is left out. "outside" is the side of the normals, "inside" that behind the
         faces.
     faces : (k,) int or (m,) bool, optional
-        Ids of the faces to thicken, or a boolean for each face. To add material to some faces of a part, write
-        ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=ids))``.
+        Ids of the faces to thicken, or a boolean for each face; all by default. To add material to some faces of a
+        part, write ``complete(part) | complete(thicken(part, 0.2, side="outside", faces=ids))``.
     resolution : int, optional
         Number of nodes along the longest side of the default grid; 128 by default. The solid should be at least
         two cells thick.

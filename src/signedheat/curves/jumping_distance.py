@@ -103,8 +103,9 @@ def piecewise_distance(
         Whether φ is computed on an intrinsic triangulation, as for `SignedHeatSolver`. "auto" refines a triangle mesh
         intrinsically if large angles or thin triangles would spoil directions. The field then lies on the refinement.
     smooth : bool
-        Whether φ is made continuous away from its cut. If false, the second step is left out, so that small jumps
-        remain and the gradient is Y in every triangle. That is better where halves of a curve face each other.
+        Whether φ is made continuous away from its cut, as it is by default. If false, the second step is left out, so
+        that small jumps remain and the gradient is Y in every triangle. That is better where halves of a curve face
+        each other.
     progress : callable, optional
         Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
         begins. An exception that it raises cancels.

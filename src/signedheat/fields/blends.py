@@ -12,7 +12,7 @@ from .field_domain import FieldDomain
 def smooth_union(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:
     """Unite two solids, with a rounded seam where their surfaces meet.
 
-    Where the two fields differ by less than the width w, φ is the polynomial smooth minimum
+    Where the two fields differ by less than the width w, the result φ is the polynomial smooth minimum
     ``min(a, b) − (w − |a − b|)² / 4w``. Elsewhere it is the smaller of the two. The concave edge where the surfaces
     meet becomes a fillet of about that width.
 
@@ -56,7 +56,7 @@ def smooth_union(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field
 def smooth_intersection(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:
     """Intersect two solids, with a rounded edge where their surfaces meet.
 
-    Where the two fields differ by less than the width w, φ is the polynomial smooth maximum
+    Where the two fields differ by less than the width w, the result φ is the polynomial smooth maximum
     ``max(a, b) + (w − |a − b|)² / 4w``. Elsewhere it is the greater of the two.
 
     Parameters

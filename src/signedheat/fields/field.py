@@ -93,9 +93,11 @@ class Field(Displayed, Frozen, Generic[Domain]):
     source : SourceTerm, optional
         The source that a solver computed the field from; `sharpen` uses it. By default it is not known.
     coarse : Field, optional
-        φ on a coarse grid of the whole box, for points beyond a band. Every field in a band needs one.
+        φ on a coarse grid of the whole box, for points beyond a band. Every field in a band needs one, and by default
+        there is none.
     finer : Field, optional
-        φ on the intrinsic triangulation of a mesh on which it was computed. Values at points and contours use it.
+        φ on the intrinsic triangulation of a mesh on which it was computed. Values at points and contours use it. By
+        default the values of this field are used.
 
     Raises
     ------
@@ -215,7 +217,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.finest._interpolant(points)
 
     def gradient(self, points: Curve | SurfacePoints | ArrayLike) -> Floats:
-        """Compute the gradient ∇φ at points, exactly if the field holds its solid, else from its values.
+        """Compute the gradient ∇φ of the field φ at points, exactly if it holds its solid, else from its values.
 
         On grids, central differences at the nodes are interpolated. On tets, volume-weighted means at the vertices are
         interpolated. On surfaces it is the constant gradient in the triangle. Outside a grid or tets, it is the
@@ -253,7 +255,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
 
     @property
     def cell_gradients(self) -> Floats:
-        """Gradient ∇φ of each of m triangles or tets, (m, 3) float, with φ linear in it; zero in degenerate triangles.
+        """(m, 3) gradients of the field φ in m triangles or tets, with φ linear in each; 0 in degenerate triangles.
 
         Where φ was computed on finer triangles, `gradient` is more accurate. Fields on grids have no such cells.
         """
@@ -340,7 +342,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
 
     @property
     def finest(self) -> Field[FieldDomain]:
-        """The field on the domain on which φ was computed.
+        """The field on the domain on which its values were computed.
 
         This is `finer` if there is one with the same values at the vertices of this field, otherwise the field itself.
         """
@@ -356,12 +358,12 @@ class Field(Displayed, Frozen, Generic[Domain]):
     @overload
     def restrict(self) -> Field[FieldDomain]: ...
     def restrict(self) -> Field[FieldDomain]:
-        """Restrict φ to a plainer domain: a band to its coarse grid, or an intrinsic triangulation to its mesh.
+        """Restrict the field to a plainer domain: a band to its coarse grid, or an intrinsic triangulation to its mesh.
 
         Returns
         -------
         Field
-            φ on the coarse grid or on the mesh. A field on any other domain returns itself.
+            Its values on the coarse grid or on the mesh. A field on any other domain returns itself.
 
         See Also
         --------
@@ -389,12 +391,12 @@ class Field(Displayed, Frozen, Generic[Domain]):
         A band of nodes near the surface becomes its whole grid, with values from the coarse field at the other nodes.
         An intrinsic triangulation, also that of `finer`, has edges that cross faces of its mesh. It becomes a mesh of
         flat polygons, its `common_subdivision` with the mesh. On the cut surface of `piecewise_distance`, the vertices
-        along the cut are doubled, so that φ can jump.
+        along the cut are doubled, so that values can jump.
 
         Returns
         -------
         Field
-            φ on that grid or mesh, in the same units. A field on any other domain returns itself.
+            Its values on that grid or mesh, in the same units. A field on any other domain returns itself.
 
         See Also
         --------
@@ -449,7 +451,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline] | list[Curve]: ...
     @public_call
     def contour(self, level: float = 0.0) -> TriangleMesh | list[Polyline] | list[Curve]:
-        """Extract the level set φ = level.
+        """Extract the level set φ = level of the field φ.
 
         In space, the level set is a closed manifold mesh whose normals point to greater φ. Where it would leave the
         domain, as the completion of an open shape may do, it is closed along the box of the grid (1 % of a cell
@@ -546,7 +548,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return self.contour(distance)
 
     def save_contour(self, path: str | PathLike[str], level: float = 0.0) -> tuple[int, int]:
-        """Write the level set φ = level in space to a file.
+        """Write the level set φ = level of the field φ in space to a file.
 
         The level set of a field in a band is computed and written part by part, so that it may be larger than memory.
 
@@ -591,7 +593,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return cast("tuple[int, int]", ply.write_parts(parts, path))
 
     def to_pyvista(self) -> pyvista.DataSet:
-        """Convert the domain and its values to a PyVista data set.
+        """Convert the domain and the values of the field φ to a PyVista data set.
 
         Returns
         -------
@@ -623,7 +625,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
         return drawn
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the field to a file in the format given by its extension.
+        """Write the field φ to a file in the format given by its extension.
 
         Parameters
         ----------

@@ -58,7 +58,8 @@ class LabelImage(Represented, Frozen):
     origin : (3,) float
         The centre of the first voxel in the world.
     space : str, optional
-        The meaning of the axes of the world, as in NRRD files, such as ``"left-posterior-superior"``.
+        The meaning of the axes of the world, as in NRRD files, such as ``"left-posterior-superior"``; by default it is
+        not known.
 
     Raises
     ------

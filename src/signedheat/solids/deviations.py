@@ -167,7 +167,7 @@ class Deviation(Frozen):
         Parameters
         ----------
         bins : int
-            Number of bins.
+            Number of bins, 40 by default.
 
         Returns
         -------
@@ -201,7 +201,7 @@ class Deviation(Frozen):
         Parameters
         ----------
         n : int
-            Largest number of points to return.
+            Largest number of points to return, 10 by default.
 
         Returns
         -------

@@ -155,7 +155,7 @@ def contour(
     level : float
         Value of the function, or of the array, on the surface; 0 by default.
     sharp : bool
-        Use dual contouring; otherwise marching cubes, which cut edges off.
+        Whether to use dual contouring, the default, or else marching cubes, which cut edges off.
     gradient : callable, or (nx, ny, nz, 3) float, optional
         A function that returns the (n, 3) gradients of `f` at (n, 3) points; or, for an array, the gradients at its
         nodes. By default they are estimated by differences.

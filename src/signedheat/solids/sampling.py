@@ -44,9 +44,9 @@ def sample_distances(
         A shape, which is completed to a solid, or a solid, or a field on a grid that has one, such as those that
         `signed_distance` and ``sharpen(field, shape)`` return.
     n : int
-        Number of points.
+        Number of points, 250,000 by default.
     near : float
-        Fraction of the points that are drawn near the surface, from 0 to 1.
+        Fraction of the points that are drawn near the surface, from 0 to 1; 0.8 by default.
     widths : sequence of float
         Standard deviations of the noise, relative to the radius of the bounding sphere. Each is used for an equal
         number of points. By default 0.05 and 0.0158.

@@ -330,16 +330,17 @@ class Solid(Displayed, Represented, Frozen):
         resolution : int, optional
             Number of nodes along the longest side of a grid around the solid; 128 by default.
         spacing : float or (3,) float, optional
-            Distance between nodes, in place of `resolution`, in the units of the shape.
+            Distance between nodes, in place of `resolution`, in the units of the shape; by default it follows from it.
         padding : float, optional
             Distance between the solid and the boundary of the grid; by default a fifth of the solid's longest side.
         grid : Grid, optional
-            A grid of your own, in place of the one around the solid.
+            A grid of your own, in place of the default one around the solid.
         band : float, optional
-            Compute only blocks of 8³ nodes that may be within this distance of the surface, for very fine grids.
+            Compute only blocks of 8³ nodes that may be within this distance of the surface, for very fine grids. By
+            default all nodes are computed.
         store : str or path, optional
-            Folder for the values of a band, which are mapped into memory as they are used. A second run resumes where
-            the first was stopped. Workers must be able to read and write it.
+            Folder for the values of a band, which are mapped into memory as they are used. By default they are in
+            memory. A second run resumes where the first was stopped. Workers must be able to read and write it.
         scheduler : concurrent.futures.Executor, distributed.Client or str, optional
             What computes the tiles of a store: a pool, such as a `ProcessPoolExecutor`, or a Dask cluster, by its
             client or its address, such as ``"tcp://127.0.0.1:8786"``. By default, threads of this process.
@@ -415,15 +416,16 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         level : float, optional
-            Contour the surface at this signed distance, in units of length; negative inside.
+            Contour the surface at this signed distance, in units of length; negative inside; by default 0, if
+            there is a spacing or a resolution.
         spacing : float or (3,) float, optional
             Contour with cells of this size.
         resolution : int, optional
             Contour with this number of nodes along the longest side of a grid that contains the solid and the surface;
             128 if only a level is given.
         sharp : bool
-            Contour by dual contouring with exact distances and normals; False contours by marching cubes, which cut
-            edges off.
+            Whether to contour by dual contouring with exact distances and normals, the default, or else by marching
+            cubes, which cut edges off.
         tolerance : float, optional
             Simplify the surface with manifold3d: no point of either surface is farther than this from the other. If
             manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
@@ -505,9 +507,9 @@ class Solid(Displayed, Represented, Frozen):
         corners : "round", "mitre" or "sharp"
             Shape of edges where offset faces move apart, as for `signedheat.offset`; by default they are rounded.
         resolution : int
-            Number of nodes along the longest side of the grid.
+            Number of nodes along the longest side of the grid, 128 by default.
         spacing : float or (3,) float, optional
-            Distance between nodes, in place of `resolution`.
+            Distance between nodes, in the units of the shape. By default it follows from `resolution`.
         progress : callable, optional
             Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
             begins. An exception that it raises cancels.
@@ -545,7 +547,7 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         n : int
-            Number of points.
+            Number of points, 250,000 by default.
         near : float
             Fraction of the points that are drawn near the surface, from 0 to 1.
         widths : sequence of float
@@ -593,7 +595,8 @@ class Solid(Displayed, Represented, Frozen):
         normal : (3,) float
             Its normal, of any length; z by default.
         heights : (k,) float, optional
-            Cut by k planes at these distances from the origin along the normal, in one pass.
+            Cut by k planes at these distances from the origin along the normal, in one pass. By default there is one
+            plane, through the origin.
 
         Returns
         -------

@@ -148,7 +148,7 @@ def draw_plane(field: Field[Grid], axes: Axes, shape: SpaceSources | None = None
     axes : Matplotlib axes
         Where to draw it.
     shape : Polyline, PointCloud or a sequence of them, optional
-        What is drawn in red on top; other shapes are left out.
+        What is drawn in red on top, by default nothing; other shapes are left out.
     levels : sequence of float
         Further values of the field whose level sets are drawn, with heavier lines than the isolines; none by default.
     """
