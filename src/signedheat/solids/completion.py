@@ -190,7 +190,7 @@ def complete(
     constraint, diffusion : Constraint, float
         Options of the signed heat method, where the shape is completed by it, as for `SignedHeatSolver`. They are the
         constraint on φ at the shape, by default `ZeroSet`, and the factor τ of the diffusion time ``t = τ h²``, by
-        default 1, with h the distance between unknowns.
+        default 1, with h the mean distance between unknowns.
     progress : callable, optional
         Called ten times a second as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of
         the step that runs. An exception that it raises cancels.

@@ -416,8 +416,8 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         level : float, optional
-            Contour the surface at this signed distance, in units of length; negative inside; by default 0, if
-            there is a spacing or a resolution.
+            Contour the surface at this signed distance, in units of length, negative inside. By default
+            0, if there is a spacing or a resolution.
         spacing : float or (3,) float, optional
             Contour with cells of this size.
         resolution : int, optional
@@ -596,7 +596,7 @@ class Solid(Displayed, Represented, Frozen):
             Its normal, of any length; z by default.
         heights : (k,) float, optional
             Cut by k planes at these distances from the origin along the normal, in one pass. By default there is one
-            plane, through the origin.
+            plane, through `origin`.
 
         Returns
         -------
