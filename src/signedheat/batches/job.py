@@ -289,12 +289,13 @@ class Watertight:
     surfaces : str
         Extension of the files.
     thickness : float, optional
-        Thickness of the solid around sheets, which bound nothing themselves. The surface is at half this distance from
-        the shape. By default a shape that is only a sheet is refused.
+        Thickness, in the units of the shape, of the solid around sheets, which bound nothing themselves. The surface is
+        at half this distance from the shape. By default a shape that is only a sheet is refused.
     contoured : bool
         Whether to contour the whole surface, which gives more and evenly sized triangles.
     tolerance : float, optional
-        Largest distance by which the surface may move when it is simplified. By default it is not simplified.
+        Largest distance, in the units of the shape, by which the surface may move when it is simplified. By default it
+        is not simplified.
     resolution, spacing
         The grid on which to contour the whole surface, as in `Solid.surface`. By default faces are kept, or with
         `contoured` or `thickness` there are 256 nodes along the longest side.

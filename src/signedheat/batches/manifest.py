@@ -29,7 +29,7 @@ class Outcome:
     state : "done", "failed", "timed out" or "died"
         How the job ended: all results written, an error, stopped at the time limit, or its process died.
     seconds : float
-        How long it took.
+        Seconds that it took.
     message : str
         The error, or if all results were written, important notes and warnings about them.
     outputs : tuple of str

@@ -37,9 +37,10 @@ class Cut(Frozen):
     points : (k, 3) float
         Positions of these vertices, in the units of the surface.
     jumps : (k - 1, 2) float
-        Absolute difference of the field between the two sides of each edge, at the two ends of the edge.
+        Absolute difference of the field between the two sides of each edge, at the two ends of the edge, in the units
+        of the field.
     steps : (k - 1,) float
-        Length of each edge, along the surface.
+        Length of each edge, along the surface and in its units.
 
     See Also
     --------

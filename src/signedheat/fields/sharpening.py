@@ -85,10 +85,11 @@ def sharpen(
     Returns
     -------
     Field
-        On the same domain, with a note `diagnostics.SharpenedToShape` or `diagnostics.SharpenedToCurves`. On
-        surfaces and tets ``diagnostics`` has a note `diagnostics.SlopeErrors`, the root mean squares of ``|∇φ| − 1``
-        over the domain before and after, and notes of the method. If slopes became clearly worse, an `InexactWarning`
-        is issued, and the note says so.
+        The sharpened field, on the same domain. If it was sharpened to a source, there is a note
+        `diagnostics.SharpenedToShape` on tets, or `diagnostics.SharpenedToCurves` on surfaces. On surfaces and tets
+        ``diagnostics`` has a note `diagnostics.SlopeErrors`, the root mean squares of ``|∇φ| − 1`` over the domain
+        before and after, and notes of the method. If slopes became clearly worse, an `InexactWarning` is issued, and
+        the note says so.
 
     Raises
     ------

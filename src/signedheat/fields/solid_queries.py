@@ -21,7 +21,7 @@ class Closest:
     distances : (...) float
         Signed distances, negative inside, in the units of the shape.
     points : (..., 3) float
-        The nearest points.
+        The nearest points, in the units of the shape.
     faces : (...) int
         Face of the given shape on which each point lies; −1 on the completion.
     barycentric : (..., 3) float

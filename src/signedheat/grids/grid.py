@@ -132,9 +132,10 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
         resolution : int
             Number of nodes along the longest side, 128 by default; all axes have the same spacing.
         padding : float, optional
-            Least distance between the box and the boundary of the grid; a fifth of the longest side by default.
+            Least distance between the box and the boundary of the grid, in the units of the shape; a fifth of the
+            longest side by default.
         spacing : (d,) float or float, optional
-            Distance between nodes; if given, the resolution is ignored.
+            Distance between nodes, in these units. If it is given, the resolution is ignored.
 
         Returns
         -------

@@ -54,9 +54,9 @@ class LabelImage(Represented, Frozen):
     labels : (nx, ny, nz) number
         The label of each voxel.
     axes : (3, 3) float
-        The step from one voxel to the next along each axis of the image, in columns.
+        The step from one voxel to the next along each axis of the image, in columns and in the units of the file.
     origin : (3,) float
-        The centre of the first voxel in the world.
+        The centre of the first voxel in the world, in these units.
     space : str, optional
         The meaning of the axes of the world, as in NRRD files, such as ``"left-posterior-superior"``; by default it is
         not known.

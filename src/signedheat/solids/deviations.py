@@ -55,7 +55,7 @@ class Deviation(Frozen):
     distances : (n,) float
         Distances of its points or vertices, in their units.
     nearest : (n, 3) float
-        The nearest points of the part.
+        The nearest points of the part, in the units of the scan.
     completed : (n,) bool
         Whether the nearest points lie on the completion of the nominal part.
     beyond_rim : (n,) bool

@@ -27,7 +27,7 @@ class Samples:
     points : (n, 3) float
         Positions: those near the surface first, width by width, then those spread over the cube.
     distances : (n,) float
-        Signed distances to the shape and its completion, negative inside.
+        Signed distances to the shape and its completion, in the units of the shape, negative inside.
     gradients : (n, 3) float
         Gradients of the distance, of length 1.
     near : (n,) bool
@@ -35,9 +35,9 @@ class Samples:
     completed : (n,) bool
         Whether the nearest point lies on the completion.
     center : (3,) float
-        Centre of the box around the surface.
+        Centre of the box around the surface, in the units of the shape.
     radius : float
-        Distance from the centre to the farthest point of the surface.
+        Distance from the centre to the farthest point of the surface, in the units of the shape.
 
     See Also
     --------

@@ -76,11 +76,12 @@ class Solid(Displayed, Represented, Frozen):
     Attributes
     ----------
     triangles : (m, 3, 3) float
-        All triangles that distance is measured to, cut where bodies overlap.
+        All triangles that distance is measured to, cut where bodies overlap, in the units of the shape.
     origins : (m,) int
         Face of the shape that each triangle is part of; −1 in the completion.
     confidence : (m,) float
-        Confidence in each triangle: 1 where it was given, less for patches, the farther they are from given faces.
+        Confidence in each triangle, from 0 to 1: 1 where it was given, less for patches, the farther they are from
+        given faces.
     bounding : (m,) bool
         Whether a triangle has the inside behind it and the outside in front.
     windings : Windings
@@ -332,12 +333,13 @@ class Solid(Displayed, Represented, Frozen):
         spacing : float or (3,) float, optional
             Distance between nodes, in place of `resolution`, in the units of the shape; by default it follows from it.
         padding : float, optional
-            Distance between the solid and the boundary of the grid; by default a fifth of the solid's longest side.
+            Distance between the solid and the boundary of the grid, in the units of the shape; by default a fifth of
+            the solid's longest side.
         grid : Grid, optional
             A grid of your own, in place of the default one around the solid.
         band : float, optional
-            Compute only blocks of 8³ nodes that may be within this distance of the surface, for very fine grids. By
-            default all nodes are computed.
+            Compute only blocks of 8³ nodes that may be within this distance of the surface, in the units of the shape,
+            for very fine grids. By default all nodes are computed.
         store : str or path, optional
             Folder for the values of a band, which are mapped into memory as they are used. By default they are in
             memory. A second run resumes where the first was stopped. Workers must be able to read and write it.
@@ -419,7 +421,7 @@ class Solid(Displayed, Represented, Frozen):
             Contour the surface at this signed distance, in units of length, negative inside. By default
             0, if there is a spacing or a resolution.
         spacing : float or (3,) float, optional
-            Contour with cells of this size.
+            Contour with cells of this size, in units of length. By default it follows from `resolution`.
         resolution : int, optional
             Contour with this number of nodes along the longest side of a grid that contains the solid and the surface;
             128 if only a level is given.
@@ -427,8 +429,8 @@ class Solid(Displayed, Represented, Frozen):
             Whether to contour by dual contouring with exact distances and normals, the default, or else by marching
             cubes, which cut edges off.
         tolerance : float, optional
-            Simplify the surface with manifold3d: no point of either surface is farther than this from the other. If
-            manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
+            Simplify the surface with manifold3d, by a length: no point of either surface is farther than this from the
+            other. If manifold3d finds no such surface, it is not simplified, with an `InexactWarning`.
         progress : callable, optional
             Called as ``progress(fraction, step)`` with the fraction done, from 0 to 1, and the name of the step that
             begins. An exception that it raises cancels.
@@ -591,7 +593,7 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         origin : (3,) float
-            A point of the plane.
+            A point of the plane, in the units of the shape.
         normal : (3,) float
             Its normal, of any length; z by default.
         heights : (k,) float, optional
@@ -635,7 +637,7 @@ class Solid(Displayed, Represented, Frozen):
         Parameters
         ----------
         origin : (3,) float
-            A point of the plane.
+            A point of the plane, in the units of the shape.
         normal : (3,) float
             Its normal, of any length; z by default.
 

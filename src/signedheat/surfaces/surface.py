@@ -206,12 +206,13 @@ class Surface(Frozen, LinearDomain):
         Parameters
         ----------
         values : (n,) float
-            One for each vertex of the surface.
+            One for each vertex of the surface, in any units.
 
         Returns
         -------
         (m,) float
-            One for each vertex of the triangulation. At vertices added within polygons, values are interpolated.
+            One for each vertex of the triangulation, in the same units. At vertices added within polygons, values are
+            interpolated.
 
         See Also
         --------
@@ -273,7 +274,8 @@ class Surface(Frozen, LinearDomain):
             points. Of these, the path begins at the nearest. With ``field.contour()``, it begins at the zero set of a
             field.
         end : int, (3,) or (n, 3) float, or SurfacePoints
-            A vertex or points. Of several, the path leads to the nearest.
+            The id of a vertex, or points, in space in the units of the surface. Of several, the path leads to the
+            nearest.
 
         Returns
         -------
@@ -382,7 +384,8 @@ class Surface(Frozen, LinearDomain):
         oriented : bool
             Whether the curve has a positive side, to its left, and a negative side.
         max_distance : float, optional
-            Largest distance of a point from the surface; 5 % of the diagonal of its bounding box by default.
+            Largest distance of a point from the surface, in its units; 5 % of the diagonal of its bounding box by
+            default.
 
         Returns
         -------
