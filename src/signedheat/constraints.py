@@ -81,8 +81,13 @@ class Free(Constraint):
 
     Examples
     --------
-    >>> Free()
-    Free()
+    Of two lines that both face left, neither is at zero, and their mean is.
+
+    >>> import signedheat as sh
+    >>> lines = [sh.Polyline([[x, -1], [x, 2]]) for x in (0.5, 1.5)]
+    >>> phi = sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (21, 11))).distance(lines, constraint=Free())
+    >>> np.abs(phi([[0.5, 0.5], [1.5, 0.5]])).round(1).tolist()
+    [0.5, 0.5]
     """
 
     def integrate(self, integration: Integration, divergence: Floats, source: SourceTerm) -> Floats:
@@ -110,8 +115,13 @@ class ZeroSet(Constraint):
 
     Examples
     --------
-    >>> ZeroSet(hard=True)
-    ZeroSet(hard=True)
+    Two lines that both face left, but are zero both.
+
+    >>> import signedheat as sh
+    >>> lines = [sh.Polyline([[x, -1], [x, 2]]) for x in (0.5, 1.5)]
+    >>> phi = sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (21, 11))).distance(lines, constraint=ZeroSet())
+    >>> np.abs(phi([[0.5, 0.5], [1.5, 0.5]])).round(1).tolist()
+    [0.0, 0.0]
     """
 
     hard: bool = False
@@ -139,8 +149,13 @@ class EachComponent(Constraint):
 
     Examples
     --------
-    >>> EachComponent()
-    EachComponent(hard=False)
+    Two lines that both face left, at levels that differ by their distance.
+
+    >>> import signedheat as sh
+    >>> lines = [sh.Polyline([[x, -1], [x, 2]]) for x in (0.5, 1.5)]
+    >>> phi = sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (21, 11))).distance(lines, constraint=EachComponent())
+    >>> np.abs(phi([[0.5, 0.5], [1.5, 0.5]])).round(1).tolist()
+    [0.5, 0.5]
     """
 
     hard: bool = False
@@ -177,8 +192,13 @@ class LevelValues(ShortRepr, Constraint):
 
     Examples
     --------
-    >>> LevelValues([0.0, 1.0]).values
-    (0.0, 1.0)
+    Two contour lines.
+
+    >>> import signedheat as sh
+    >>> lines = [sh.Polyline([[x, -1], [x, 2]]) for x in (0.5, 1.5)]
+    >>> phi = sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (21, 11))).distance(lines, constraint=LevelValues([0.0, -2.0]))
+    >>> np.abs(phi([[0.5, 0.5], [1.5, 0.5]])).round(1).tolist()
+    [0.0, 2.0]
     """
 
     values: Sequence[float]
@@ -233,8 +253,13 @@ class Soft(Constraint):
 
     Examples
     --------
-    >>> Soft(10.0)
-    Soft(weight=10.0)
+    Two lines that both face left, and are nearly at zero.
+
+    >>> import signedheat as sh
+    >>> lines = [sh.Polyline([[x, -1], [x, 2]]) for x in (0.5, 1.5)]
+    >>> phi = sh.SignedHeatSolver(sh.Grid((0, 0), 0.1, (21, 11))).distance(lines, constraint=Soft(10.0))
+    >>> np.abs(phi([[0.5, 0.5], [1.5, 0.5]])).round(1).tolist()
+    [0.1, 0.1]
     """
 
     weight: float | None = None
