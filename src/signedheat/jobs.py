@@ -225,7 +225,10 @@ def interruptible(function: Callable[..., Result], *arguments: Any, **named: Any
 
 
 def run_limited(job: Callable[[], Any], seconds: float) -> Any:
-    """Run a job on its own thread and return its result; raise `TimeoutError` if it takes longer than `seconds`."""
+    """Run a job on its own thread and return its result; raise `TimeoutError` if it takes longer than `seconds`.
+
+    A late job is told to stop, and ends at the next kernel that it calls.
+    """
     end = time.monotonic() + seconds
 
     def refuse_to_wait() -> None:

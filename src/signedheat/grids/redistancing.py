@@ -522,7 +522,11 @@ def _cubic(field: Floats, position: Floats, weights: Floats, gradient: Floats) -
 
 @compiled
 def crossings_at(field: Floats, edges: NDArray[np.int32], steps: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return the attributes of `Crossings` for (e, 5) crossed edges of a field with four axes."""
+    """Return (e, 4) positions on the zero set, (e, 4) normals and (e, 4, 4) shape operators there, as in `Crossings`.
+
+    They are those of the cubic interpolant of a field with four axes of spacings `steps`, (4,). Crossed edges are the
+    four indices of their tail, and the axis along which they run, (e, 5).
+    """
     n = len(edges)
     positions, normals, bends = np.empty((n, 4)), np.empty((n, 4)), np.empty((n, 4, 4))
     weights = np.empty((2, 4, 4))

@@ -282,7 +282,8 @@ def _object(element: ElementTree.Element, part: str) -> _Object:
 def read_step(path: PathLike, deflection: float | None = None) -> tuple[TriangleMesh, Ints]:
     """Read the triangles of a ``.step`` or ``.stp`` file, and the number of the CAD face that each is part of.
 
-    ``cad_faces[solid.closest(points).faces]`` are the CAD faces nearest to points, where no surface is completed.
+    With ``faces = complete(mesh).closest(points).faces``, ``cad_faces[faces]`` are the CAD faces nearest to points
+    where ``faces >= 0``. Where it is −1, a completed surface is nearest, which is part of no CAD face.
 
     Parameters
     ----------
@@ -313,7 +314,8 @@ def read_step(path: PathLike, deflection: float | None = None) -> tuple[Triangle
     Examples
     --------
     >>> mesh, cad_faces = read_step("part.step", deflection=0.01)  # doctest: +SKIP
-    >>> cad_faces[signedheat.complete(mesh).closest(points).faces]  # doctest: +SKIP
+    >>> faces = signedheat.complete(mesh).closest(points).faces  # doctest: +SKIP
+    >>> cad_faces[faces[faces >= 0]]  # doctest: +SKIP
     """
     fineness = {"deflection": deflection, "fineness": FACET_DEFLECTION, "angle": FACET_ANGLE}
     # one line may describe a surface of very many triangles, or one that is slow to triangulate

@@ -216,9 +216,10 @@ def bent_edges(vertices: Floats, faces: Ints, angle: float = CREASE_ANGLE) -> tu
 def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> tuple[Ints, Ints, Ints]:
     """Choose pairs of faces whose common edge ab is flipped to cd, because the surface then bends less.
 
-    No two pairs are neighbours. An edge is not flipped if there is an edge cd already. `whole`, (n,), tells vertices
-    whose faces are all given, as a, b and one of c and d must be. Returns (k,) faces to replace, (k, 3) their
-    replacements, and (j, 4) the vertices of all pairs that would gain by a flip.
+    No two pairs are neighbours. An edge is not flipped if there is an edge cd already. The (m, 3) `faces` may be part
+    of a surface. `whole`, (n,), is true for vertices all of whose faces are among them. It must be for a, b, and one of
+    c and d, so that an edge cd would be seen. Pairs with a vertex for which `held`, (n,), is true are not flipped.
+    Returns (k,) faces to replace, (k, 3) their replacements, and (j, 4) vertices of all pairs that gain by a flip.
     """
     table, normals, creases = bent_edges(vertices, faces)
     (first, second), (i, j) = (creases // 3).T, (creases % 3).T

@@ -162,7 +162,10 @@ class Deviation(Frozen):
         return np.asarray(np.percentile(self.of_surface, percentages(percents)))
 
     def histogram(self, bins: int = HISTOGRAM_BINS) -> tuple[Ints, Floats]:
-        """Count points by deviation; those beyond `extreme` count in the first or last bin.
+        """Count points by deviation, in bins of equal width from −`extreme` to `extreme`.
+
+        Points beyond count in the first or last bin. If `extreme`, the 99th percentile of the absolute deviations, is
+        0, bins go from −1 to 1.
 
         Parameters
         ----------

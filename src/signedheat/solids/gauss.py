@@ -431,7 +431,9 @@ def links_of(points: Floats, normals: Floats, owners: Ints) -> Links:
 def agreement(links: Links, shares: Floats, owners: Ints) -> sparse.csr_array:
     """(k, k) matrix of the second term of E: a signed graph Laplacian of the pieces, times μ.
 
-    A link is weaker the more samples its pieces have. `shares` are the (n,) parts of the whole area of the samples.
+    `links` join pairs of the n samples, with strengths from −1 to 1 that are negative where normals point apart. A link
+    is weaker the more samples its pieces have. `owners`, (n,), are the k pieces that samples lie on, and `shares`,
+    (n,), the shares of the whole area that they stand for.
     """
     (tails, heads, strength), n = links, len(owners)
     total = np.bincount(tails, np.abs(strength), n) + np.bincount(heads, np.abs(strength), n)

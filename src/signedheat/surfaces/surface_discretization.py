@@ -105,7 +105,10 @@ class SurfaceDiscretization:
         return segments_of_each(sources, self.triangles, positions)
 
     def _turned_to(self, triangles: IntrinsicMesh) -> SurfaceDiscretization:
-        """Return the discretisation with other first faces at nonmanifold edges; it shares step 3 with this one."""
+        """Return the discretisation with other first faces at nonmanifold edges, whose layouts hold the edges' frames.
+
+        Vectors of steps 1 and 2 depend on these frames. Step 3 does not, and is shared with this discretisation.
+        """
         if triangles is self.triangles:
             return self
 
