@@ -91,7 +91,11 @@ class Discretization(Adaptable, Protocol):
         """Yield `diffuse` of several sources with the same τ, computed together if that is faster."""
 
     def to_cells(self, vectors: Any) -> NDArray[Any]:
-        """Return X at the cells in which ∇φ is computed, as complex numbers on surfaces, and as rows in space."""
+        """Return X at the cells in which ∇φ is computed, from X as `diffuse` returns it; only directions matter.
+
+        On surfaces these are (m,) complex numbers in the layouts of the faces, in tets (m, 3) vectors, and on grids,
+        whose nodes are the cells, (*shape, d).
+        """
 
     def divergence(self, directions: NDArray[Any]) -> Any:
         """Return b, the right-hand side of ``C φ = b``, for unit vectors Y at the cells."""

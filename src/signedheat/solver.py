@@ -285,7 +285,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         Parameters
         ----------
         sources : sequence
-            Entries that `distance` accepts as its `sources`.
+            Each entry is one source or a sequence of them, to which one field is computed: on surfaces curves and
+            points, in space meshes and point clouds, in the plane polylines.
         constraint : Free, ZeroSet, EachComponent, LevelValues or Soft
             Constraint on every field at its source; `ZeroSet` by default. With `Free`, the sources share most of the
             work.

@@ -54,7 +54,10 @@ class JumpProblem:
     floor: float = 0.0  # the cost that does not depend on the constants
 
     def differences(self, constants: Floats) -> Floats:
-        """Return (p,) constants of the first face of each pair minus those of the second; K c in the notes above."""
+        """Return (p,) constants, of which there is one for each face, of the first minus the second face of each pair.
+
+        This is K c in the notes above.
+        """
         return constants[self.faces[:, 0]] - constants[self.faces[:, 1]]
 
     def objective(self, constants: Floats) -> float:

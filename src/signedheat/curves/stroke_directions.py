@@ -165,11 +165,14 @@ class Decision:
         return self.pieces.curves(against & (not few))
 
     def worth_little(self) -> Ints:
-        """Return the indices of curves on which the inside depends, although they are worth little.
+        """Return the sorted indices of given curves on which the inside depends, although they are worth little.
 
-        The worth of a stroke is the increase of the unexplained length if it is left out. A piece of a curve is worth
-        its length and that of the gap it fills. A single arc is worth its length less that of its gap. A stray stroke
-        is worth little, since the boundary has to make a detour to it.
+        The unexplained length is that of the boundary without strokes, and of strokes that do not bound the inside. The
+        worth of a stroke is the increase of that length if the stroke is left out: little is less than `WORTH` times
+        its own length. The inside depends on it if a share `CHANGED_AREA` of the area then changes sides.
+
+        A stroke that continues others is worth its length and that of the gap it fills. A single arc is worth its
+        length less that of its gap. A stray stroke is worth little, since the boundary has to make a detour to it.
         """
         strokes, reading = self.pieces.strokes, self.reading
         missing = strokes.unexplained(reading)  # a stroke is worth its length less this, or more

@@ -279,7 +279,9 @@ class Field(Displayed, Frozen, Generic[Domain]):
         Returns
         -------
         Closest
-            Signed distances, nearest points with their faces and barycentric weights, gradients, and confidence.
+            Signed distances, nearest points, gradients and confidence, in arrays of shape (...) or (..., 3). Also the
+            faces of the given shape on which the nearest points lie, −1 on the completion, and barycentric coordinates
+            there, NaN on the completion and in faces other than triangles.
 
         Raises
         ------

@@ -74,7 +74,11 @@ def refuse_large_grid(grid: Grid, per_node: float | None = None, extra: float = 
 def fitting_spacing(
     grid: Grid, available: int, per_node: float | None = None, extra: float = 0.0, area: float = 0.0
 ) -> Floats:
-    """(d,) roughly the least spacing, in proportion to that of the grid, with which its box fits into memory."""
+    """(d,) roughly the least spacing, in proportion to that of the grid, with which its box fits into memory.
+
+    That is, into `available` bytes. The work takes `per_node` bytes for each node, by default those of a distance, and
+    `extra` bytes. A surface of the given area, in the units of the grid, adds more in space.
+    """
     base = memory_estimate(grid, 0.0, extra)
     whole = memory_estimate(grid, per_node, extra) - base
     spacing: Floats = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
@@ -251,9 +255,11 @@ class GridIntegration(SolvesEach):
         return self._penalized(divergence, source, levels, strength, zero, np.zeros(self.grid.shape))
 
     def fit_exactly(self, divergence: Floats, source: GridSource, levels: Levels) -> Floats:
-        """Return φ with exactly the given levels at the samples, by an augmented Lagrangian for Eq. 14.
+        """Return φ with exactly the given levels at the s samples, by an augmented Lagrangian for Eq. 14.
 
-        The error that remains is removed by changes at nodes near samples.
+        φ and `divergence`, the right-hand side b, are in the shape of the grid. `levels` are (s,) values, or with
+        groups of samples, values up to an unknown constant for each group. The error that remains is removed by changes
+        at nodes near samples.
         """
         refuse_beyond_memory(
             f"the zero set imposed exactly on {self.grid.n_nodes:,} nodes",

@@ -64,7 +64,9 @@ def zero_set(height: NDArray[np.floating], cells: Bools | None = None) -> tuple[
 def level_lines(values: Floats, spacing: Floats, level: float) -> list[tuple[Floats, bool]]:
     """Return the (k, 2) points, in cells, of each line of a level set in the plane, and whether the line is closed.
 
-    Greater values are to the left of lines.
+    Values are those at (nx, ny) nodes, NaN where there is none, and lines end there. Greater values are to the left of
+    lines. Values that differ from the level by a tiny share of the (2,) `spacing` are moved away from it, so that lines
+    keep clear of nodes. Raise `OutsideError` if all values are on one side of the level.
     """
     lines = measure.find_contours(heights_above(values, spacing, level), 0.0, positive_orientation="high")
     return [(line, len(line) > 3 and bool((line[0] == line[-1]).all())) for line in lines]

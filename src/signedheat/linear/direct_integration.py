@@ -146,7 +146,11 @@ class DirectIntegration(Frozen):
         return self._pulled(key, lambda: self._factorize_pulled(rows, springs))
 
     def _factorize_pulled(self, rows: sparse.csr_matrix, springs: Floats) -> Factor:
-        """Compute the factor of `_pulled_factor`, in the memory of an earlier one of the same pattern if possible."""
+        """Compute the factor of ``C + Aᵀ S A``, with A the `rows`, (s, n), and S = diag(`springs`), (s,) stiffnesses.
+
+        On connected components without springs, where that is singular, one diagonal entry is doubled. The factor is
+        stored in the memory of an earlier one of the same pattern if possible.
+        """
         matrix = upper_triangle(self.stiffness + upper_triangle(rows.T @ sparse.diags_array(springs) @ rows))
         unreached = np.isin(self.components[self._first_vertices], self._component_of(rows[springs > 0]), invert=True)
         matrix = _grounded(matrix, self._first_vertices[unreached])

@@ -203,7 +203,10 @@ class FaceCutter:
             self.add_pieces(p, with_middles(way.tolist(), middles), outline, positions)
 
     def outline(self, face: int, around: list[int]) -> Outline:
-        """Return the outline of a face with the nodes on its sides; `around` lists its corners 0, 1, 2 in order."""
+        """Return the points, vertices and edges along the boundary of a face, with the nodes that divide its sides.
+
+        `around` are its corners 0, 1 and 2 in cyclic order, from the one on that is at (0, 0).
+        """
         triangles, along = self.triangles, self.merged.nodes.along
         result = Outline()
         for k, side in enumerate(around):

@@ -152,7 +152,12 @@ def whole_boundary(triangles: Floats, windings: Windings, mesh: TriangleMesh | N
 
 
 def _candidates(triangles: Floats, windings: Windings, mesh: TriangleMesh | None) -> Iterator[Floats]:
-    """Yield (k, 3, 3) triangles that may bound the solid, made in different ways, the most promising one first."""
+    """Yield (k, 3, 3) triangles that may bound the solid, made in different ways, the most promising one first.
+
+    First the bodies of the mesh that the chain was made of, if it is known, are united, then those of the chain, whose
+    winding numbers are given. Finally the (m, 3, 3) `triangles`, which are an attempt, and those of the chain are cut
+    again where they meet, and closed by cones.
+    """
     for given in (mesh, None) if mesh is not None else (None,):
         bodies = Bodies.of_chain(windings) if given is None else Bodies.of_mesh(given, windings)
         united = None if bodies is None else bodies.united

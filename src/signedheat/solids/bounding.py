@@ -129,9 +129,11 @@ class _Trial:
 
 
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
-    """Decide which triangles of a chain bound something, and which way they face; `as_oriented` keeps how they face.
+    """Decide which triangles of a chain bound something, and which way they face.
 
-    `nested` says how closed parts within others face, see `complete`.
+    With "given", a closed part within another is a body if it faces as the part around does, and else a cavity. With
+    "cavities", it is a cavity, and parts within it are bodies. With "bodies", all are bodies. With `as_oriented`,
+    nothing is flipped, and the chain is read as given only.
     """
     given = as_given(chain, chain.reversed)
     whole = given.whole

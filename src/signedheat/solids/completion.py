@@ -456,7 +456,10 @@ def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) ->
 
 
 def _closed_group(vertices: Floats, faces: Ints, added: Ints, origins: Ints) -> TriangleGroup:
-    """Make a closed surface of faces with (k,) origins, which are the first k of all, and of others without."""
+    """Make a closed surface of (m, 3) faces and (j, 3) added ones, whose triangles count in the winding number.
+
+    `origins`, (k,), are the given faces that the first k faces are part of. All other faces have the origin −1.
+    """
     whole = np.concatenate([faces, added])
     return TriangleGroup(vertices[whole], whole, np.append(origins, np.full(len(whole) - len(origins), -1)), True)
 

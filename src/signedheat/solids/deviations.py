@@ -199,7 +199,9 @@ class Deviation(Frozen):
         return counts.astype(np.int64), limits
 
     def worst(self, n: int = 10) -> Ints:
-        """Find the points with the largest deviations, at least a twentieth of the scan's size apart.
+        """Find the points with the largest deviations, more than a twentieth of the scan's size apart.
+
+        The size is the diagonal of its bounding box. Vertices of the scan that no face uses do not count.
 
         Parameters
         ----------

@@ -100,7 +100,7 @@ class Orientation(Frozen, ShortRepr):
 
     @property
     def summary(self) -> dict[str, int | float]:
-        """All counts and shares of the area, by the names of the attributes."""
+        """All counts, and shares of the area from 0 to 1, by name: the attributes from `n_parts` to `cavities`."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, (int, float))}
 

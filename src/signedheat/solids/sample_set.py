@@ -92,7 +92,8 @@ class Samples:
 
         "samples" is the number of points, and "near" that of those sampled near the surface. "inside_share" and
         "completed_share" are the shares of points, from 0 to 1, that are inside, and whose nearest point lies on the
-        completion. "center" and "radius" are those of the shape.
+        completion. "center" is that of the bounding box of the surface, and "radius" the distance from it to the
+        farthest point of the surface, in the units of the shape.
         """
         return {
             "samples": len(self.points),

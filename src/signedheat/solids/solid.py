@@ -286,7 +286,9 @@ class Solid(Displayed, Represented, Frozen):
         Returns
         -------
         Closest
-            Points, distances, gradients, faces and confidence, in arrays of shape (...) or (..., 3).
+            Nearest points, signed distances, gradients and confidence, in arrays of shape (...) or (..., 3). Also the
+            faces of the given shape on which the nearest points lie, −1 on the completion, and barycentric coordinates
+            there, NaN on the completion and in faces other than triangles.
 
         Raises
         ------
@@ -709,6 +711,11 @@ class Solid(Displayed, Represented, Frozen):
         -------
         Field
             On the same grid, or in a band of the same width around this solid.
+
+        Raises
+        ------
+        UnsupportedTypeError
+            If the field is not on a grid.
 
         See Also
         --------

@@ -183,8 +183,9 @@ class Thickness(Frozen):
         ----------
         path : str or path
             ``.ply`` for the faces in colours, thin ones red, with a property ``thickness``. ``.npz`` for arrays
-            ``vertices``, ``faces``, ``thickness`` and ``origins``. ``.png``, ``.pdf``, ``.svg`` or ``.jpg`` for a
-            picture of the outside and of where it is thinnest.
+            ``vertices`` and ``faces``, and for each face its ``thickness``, NaN where no wall is opposite, and in
+            ``origins`` the face of the given shape that it is part of, −1 in the completion. ``.png``, ``.pdf``,
+            ``.svg`` or ``.jpg`` for a picture of the outside and of where it is thinnest.
 
         Raises
         ------

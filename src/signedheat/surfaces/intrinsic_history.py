@@ -163,7 +163,9 @@ def for_tracing(triangles: IntrinsicMesh) -> Gluing:
 def straight_lines(gluing: Gluing, faces: Ints, barycentric: Floats, vectors: Floats) -> Lines:
     """Trace p straight lines, given by (p,) faces and (p, 3) barycentric coordinates of midpoints, and vectors there.
 
-    Of the (p, k, 3) vectors, the first is the whole line; the others are carried along it.
+    The (p, k, 3) vectors are differences of barycentric coordinates. The first of them is the whole line; the others
+    are carried along it. Returns a row for each face that a line crosses, line after line, from tail to head. It has
+    the index of the line, the face, where the line enters and leaves it, and the k vectors there.
     """
     halves = np.ascontiguousarray(vectors, dtype=np.float64).copy()
     halves[:, 0] *= 0.5

@@ -98,7 +98,13 @@ def _(
     tolerance: float,
     report: Callable[[], None] | None,
 ) -> Nearest:
-    """Measure distance to `given` curves, or without any to the zero set of φ."""
+    """Measure distance to `given` curves, and to the zero set of φ where it completes oriented ones.
+
+    Without any, distance is that to the zero set, and to unoriented curves and points from which φ was computed.
+    `values`, (n,), are φ at the vertices of the triangles, NaN where it is unknown. `tolerance` is the largest change
+    of a distance, relative to the length of an edge, by which windows on the edge may be merged. Returns (n,) unsigned
+    distances, and the signs that the curves decide. `report` is called now and then, and may raise to cancel.
+    """
     if given is None:
         return nearest_zero(surface, values, source, tolerance, report)
     curves, _left_out = given_curves(surface.domain, as_list(given))

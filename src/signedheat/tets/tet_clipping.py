@@ -77,7 +77,11 @@ class Planes(NamedTuple):
 
 
 def clip_triangles(mesh: TetShapes, planes: Planes, triangles: Floats) -> ClippedPolygons:
-    """Clip (k, 3, 3) triangles against the tets of a mesh; parts outside the mesh are dropped."""
+    """Clip (k, 3, 3) triangles against the tets of a mesh, whose faces have the given planes.
+
+    Returns a convex polygon for each tet and triangle that overlap, with its area vector and its centroid. Parts
+    outside the mesh are dropped.
+    """
     parts = []
     for begin in range(0, max(len(triangles), 1), ROWS_PER_TASK):  # most tets near a triangle contain no part of it
         chunk = triangles[begin : begin + ROWS_PER_TASK]
