@@ -247,7 +247,9 @@ def _collect(
     """Take the windows queued for a halfedge out of their list, and return those that are nearest to some source.
 
     `at_tail` and `at_head` are distances of the ends of the edge, and `length` its length. Windows are trimmed where
-    others are nearer, sorted along the edge, and merged. Returns rows of windows, and how many of the rows are used.
+    others are nearer, sorted along the edge, and merged if that changes distances by at most `tolerance` times the
+    length. They are dropped if paths through an end of the edge are shorter by more than `slack`, a length. Returns
+    rows of windows, and how many of the rows are used.
     """
     queued, settled, windows, following, counts = (
         search.queued,
@@ -341,7 +343,9 @@ def is_waiting(queue: Queue, reach: float) -> bool:
 def continue_search(faces: Faces, search: Search, slack: float, tolerance: float, reach: float, limit: int) -> None:
     """Propagate in order of distance, up to `reach`, until rows are missing or `limit` windows have been made.
 
-    If rows for windows are missing, their number is written to ``search.counts[MISSING_ROWS]``.
+    Windows are dropped if other paths are shorter by more than `slack`, and merged if that changes distances by at most
+    `tolerance`, both relative to the length of the edge. If rows for windows are missing, their number is written to
+    ``search.counts[MISSING_ROWS]``.
     """
     queue, counts = search.queue, search.counts
     while is_waiting(queue, reach) and counts[WINDOWS_MADE] < limit:
@@ -717,7 +721,8 @@ def propagate_across(
     """Propagate a wave across a side of a face, between fractions t0 and t1 of it, to the faces beyond.
 
     A circular wave comes from `point`, or contracts to it. A beam passes `point` in the direction of the unit vector
-    `normal`. Both are in the layout of the face, and `sigma` is the distance at `point`.
+    `normal`. Both are in the layout of the face, and `sigma` is the distance at `point`. Nothing is propagated if paths
+    through an end of the edge are shorter by more than `slack`, relative to its length.
     """
     edge = faces.edges[face, side]
     length = faces.lengths[edge]

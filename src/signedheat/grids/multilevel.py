@@ -95,7 +95,8 @@ def diffuse_multilevel(
 def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
     """(4,) numbers of cells of a grid per cell of the next coarser one, 1 along axes that are not coarsened.
 
-    Axes that are no longer than the spacing along others are reduced to one node.
+    The grid has four axes, with the spacings `steps`, (4,). Axes that are no longer than the spacing along others are
+    reduced to one node.
     """
     counts = np.array(shape)
     factors = np.ones(4, dtype=np.int64)

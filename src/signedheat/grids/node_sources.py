@@ -31,7 +31,7 @@ class NodeSources(NamedTuple):
 
     @classmethod
     def empty(cls, shape: tuple[int, ...], steps: Floats) -> NodeSources:
-        """Make sources that are zero everywhere."""
+        """Make sources that are zero everywhere, on a grid with four axes, `shape` nodes and spacings `steps`."""
         places = np.full((*shape[:3], -(-shape[3] // STRETCH)), -1, dtype=np.int32)
         return cls(places, np.zeros((0, STRETCH, 4), dtype=np.float32), shape, steps)
 
@@ -56,7 +56,11 @@ class NodeSources(NamedTuple):
         return cls(empty.places, sums.reshape(-1, STRETCH, 4), shape, steps)
 
     def restricted(self, factors: Ints, shape: tuple[int, ...], steps: Floats) -> NodeSources:
-        """Restrict the sources to a coarser grid by the transpose of linear interpolation; see `coarsening`."""
+        """Restrict the sources to a coarser grid by the transpose of linear interpolation.
+
+        The coarser grid has `shape` nodes and the spacings `steps`, (4,). Its cells are `factors`, (4,), times as long
+        as those of this grid.
+        """
         nodes, values = self.nonzero()
         coarse = np.where(np.array(shape) > 1, nodes / factors, 0.0)
         return NodeSources.scattered(shape, steps, *interpolation_stencil(coarse, shape), values)

@@ -246,7 +246,10 @@ def smoothed_signs(signs: Floats) -> Floats:
 
 
 def zero_contour(values: Floats, steps: Floats) -> Contour:
-    """Extract the zero set of an array with one to four axes, without triangles if four; zero counts as positive."""
+    """Extract the zero set of an array with one to four axes, without triangles if four; zero counts as positive.
+
+    The last of the four `steps`, (4,), are the spacings along these axes.
+    """
     unused = 4 - values.ndim
     field = np.ascontiguousarray(values).reshape(padded_shape(values.shape))
     reach = float(np.linalg.norm(steps[unused:]))

@@ -225,7 +225,12 @@ class SpringIntegration(DirectIntegration):
         return self.strength
 
     def fit(self, divergence: Floats, source: SourceTerm, levels: Levels) -> Floats:
-        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, S the `springs`, and also over constants of groups."""
+        """Minimise ``½ φᵀ C φ − bᵀ φ + ½ (Aφ − l)ᵀ S (Aφ − l)``, S the `springs`, and also over constants of groups.
+
+        b is the `divergence`, (n,). A interpolates φ at averages of the samples, and l are the levels there. Returns φ,
+        (n,), NaN on connected components without samples. With groups, its mean over the samples of each component is
+        0.
+        """
         averages, springs = self.held(source)
         rows, levels = sparse.csr_matrix(averages @ source.interpolation), levels.at(averages)
         if levels.groups is not None:

@@ -261,7 +261,10 @@ def _with_crossings(
 def _divided(
     points: Floats, faces: Ints, origins: Ints, table: EdgeTable, lines: Lines, records: Records
 ) -> Arrangement:
-    """Triangulate all faces that have points on their edges, or points or lines inside; others stay undivided."""
+    """Triangulate all faces that have points on their edges, or points or lines inside; others stay undivided.
+
+    `origins`, (m,), are the given faces that the (m, 3) faces stand for, and `records` the parts of lines in faces.
+    """
     n_lines = len(lines.ends)
     on = lines.on.along(points, lines.ends)
     counts = np.bincount(on.owners, minlength=n_lines)

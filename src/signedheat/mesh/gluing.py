@@ -236,7 +236,7 @@ def push_edge(g: Gluing, stack: Ints, stacked: Bools, e: int) -> None:
 
 @compiled
 def new_edge(g: Gluing, length: float, fixed: bool) -> int:
-    """Add an edge; return its id."""
+    """Add an edge of a length, which is never flipped if it is `fixed`; return its id."""
     e: int = g.counts[N_EDGES]
     g.counts[N_EDGES] = e + 1
     g.length[e], g.fixed[e], g.flips[e] = length, fixed, 0

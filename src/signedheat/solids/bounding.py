@@ -131,8 +131,8 @@ class _Trial:
 def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False) -> Bounding:
     """Decide which triangles of a chain bound something, and which way they face.
 
-    With "given", a closed part within another is a body if it faces as the part around does, and else a cavity. With
-    "cavities", it is a cavity, and parts within it are bodies. With "bodies", all are bodies. With `as_oriented`,
+    With "given", a closed part within others is a body if it faces as the outermost of these does, and else a cavity.
+    With "cavities", it is a cavity, and parts within it are bodies. With "bodies", all are bodies. With `as_oriented`,
     nothing is flipped, and the chain is read as given only.
     """
     given = as_given(chain, chain.reversed)
@@ -180,7 +180,10 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 def _trials(
     chain: Chain, parts: _Parts, given: Reading, by_once: Reading, missing: Floats, nested: Nesting
 ) -> list[_Trial]:
-    """List the readings to try after that as given, in order; it leaves the (p,) shares `missing` unexplained."""
+    """List the readings to try after that as `given`, in order; it leaves the (p,) shares `missing` unexplained.
+
+    `by_once` reads each triangle once, and `nested` is how closed pieces within others are asked to face.
+    """
     agreed = chain.agreeing_as_indexed()
     agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
     agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
@@ -355,8 +358,10 @@ def open_bounding(
     whether there are bodies that ignore others. A piece is loose if neither it nor its group is a body by itself.
 
     `groups` are (p,) connected groups of pieces, and `given` the (p,) area of each that faces as given, less the rest.
-    Pieces that are `fixed`, (p,), have the sign 1. `closed` are (k, 3, 3) triangles of closed pieces. In each round,
-    pieces whose level is too low are left out if they leave at least half as much unexplained as the worst one.
+    `rims` are the boundary edges of pieces. `nested` decides which bodies within others are cavities, and `united`
+    whether bodies that overlap ignore each other. Pieces that are `fixed`, (p,), have the sign 1. `closed` are
+    (k, 3, 3) triangles of closed pieces. In each round, pieces whose level is too low are left out if they leave at
+    least half as much unexplained as the worst one.
     """
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1

@@ -481,7 +481,8 @@ def _rims(surface: _Surface) -> list[walls.Rim]:
 def _lid(surface: _Surface, loop: Ints, bent: bool) -> tuple[Floats, Ints]:
     """Make the lid of a loop of n vertices: (k, 3) added points, and (m, 3) triangles.
 
-    Indices below n are those of the loop, and others are added points.
+    Indices below n are those of the loop, and others are added points. If `bent`, the lid continues the curvature of
+    the surface. Otherwise it has flat faces, or nearly the least area.
     """
     corners = surface.vertices[loop]
     if len(loop) == 3:

@@ -178,8 +178,8 @@ def complete(
         Whether to keep surfaces that lie inside other bodies. By default they are left out.
     nested : {"given", "cavities", "bodies"}
         Whether closed parts within others are bodies or cavities. With "given", a part is a body if it faces as the
-        part around does, and else a cavity. With "cavities", they are cavities, and parts within these are bodies, as
-        in slicers. With "bodies", all are bodies.
+        outermost part around it does, and else a cavity. With "cavities", they are cavities, and parts within these
+        are bodies, as in slicers. With "bodies", all are bodies.
     seal : float, optional
         Seal openings of meshes that are narrower than this length, to about a sixth of it, and fill what lies behind
         them. Faces that are not reached from outside through wider openings, such as inner skins, are left out. In the

@@ -273,7 +273,7 @@ class Links(NamedTuple):
     strength: Floats  # (p,) from −1 to 1, negative where the normals point apart
 
     def chosen(self, rows: Bools) -> Links:
-        """Restrict the pairs to some of the (n,) samples, which are renumbered."""
+        """Restrict the pairs to samples for which `rows`, (n,), is true; these are renumbered in order."""
         numbers, kept = np.cumsum(rows) - 1, rows[self.tails] & rows[self.heads]
         return Links(numbers[self.tails[kept]], numbers[self.heads[kept]], self.strength[kept])
 
@@ -416,7 +416,10 @@ class Dipoles:
 
 
 def links_of(points: Floats, normals: Floats, owners: Ints) -> Links:
-    """Link (n, 3) samples with neighbours on other pieces that lie roughly in one plane with them."""
+    """Link (n, 3) samples with neighbours on other pieces that lie roughly in one plane with them.
+
+    `normals` are (n, 3) unit vectors, and `owners` the (n,) pieces that samples lie on.
+    """
     n, k = len(points), min(PLANE_NEIGHBORS, len(points) - 1)
     near = PointTree(points).query(points, k + 1)[1].reshape(n, -1)[:, 1:]
     tails, heads = np.repeat(np.arange(n), k), near.ravel()

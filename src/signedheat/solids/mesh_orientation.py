@@ -145,8 +145,8 @@ def orientation(
         The surface that the curves lie on.
     nested : {"given", "cavities", "bodies"}
         For meshes: whether closed parts within others are bodies, which face outwards, or cavities, which face inwards.
-        With "given", a part is a body if it faces as the part around does, and else a cavity. With "cavities", they are
-        cavities, and parts within these are bodies. With "bodies", all are bodies.
+        With "given", a part is a body if it faces as the outermost part around it does, and else a cavity. With
+        "cavities", they are cavities, and parts within these are bodies. With "bodies", all are bodies.
 
     Returns
     -------

@@ -145,8 +145,9 @@ def bodies_around(
 
     A sample counts its own body, the body in which this is a cavity, and cavities in it. It ignores all others.
     `nested` decides which bodies within others are cavities. Bodies that overlap ignore each other if they are to be
-    `united`. For `groups`, `alone` and `given` see `Bodies.of`; `signs` are those of the (p,) pieces, and `closed` the
-    (k, 3, 3) triangles of closed pieces.
+    `united`. For each of p pieces, (p,), there are its connected group in `groups`, its mean level without the others
+    in `alone`, its sign, and in `given` its area that faces as given, less the rest. `rims` are the boundary edges of
+    pieces, and `closed` the (k, 3, 3) triangles of closed pieces.
     """
     triangles = directed(pieces.triangles, signs[pieces.labels])
     bodies = Bodies.of(pieces, triangles, groups, alone, signs * given)

@@ -67,7 +67,10 @@ class History(Frozen):
         return self._transferred(self._later, faces, rows_of(barycentric, vectors))
 
     def backward(self, faces: Ints, barycentric: Floats, vectors: Floats | None = None) -> tuple[Ints, Floats, Floats]:
-        """Transfer points of `after`, and (p, k, 3) vectors at them, to `before`; see `forward`."""
+        """Transfer points of `after`, and (p, k, 3) vectors at them, to `before`.
+
+        Points are (p,) faces and (p, 3) barycentric coordinates; vectors are differences of such. The same is returned.
+        """
         return self._transferred(self._earlier, faces, rows_of(barycentric, vectors))
 
     def inserted(self) -> tuple[Ints, Floats]:
@@ -233,7 +236,8 @@ def linked_steps(steps: Ints, n_faces: int, forward: bool) -> tuple[NDArray[np.i
 def transfer(steps: Ints, weights: Floats, links: Links, begin: NDArray[np.int32], faces: Ints, rows: Floats) -> None:
     """Carry points and vectors through the steps that change their faces, in place.
 
-    `begin` is the first step for each point, or −1. Points have (p,) faces, and with vectors (p, 1 + k, 3) rows.
+    `begin` is the first step for each point, or −1. Points have (p,) faces, and (p, 1 + k, 3) rows: their barycentric
+    coordinates, followed by vectors. `links` lead from each step to the next one that changes the new face.
     """
     around, start = np.empty(3, np.int64), np.zeros(3, np.int64)
     for p in range(len(faces)):
