@@ -289,8 +289,8 @@ def corner_slopes(triangles: IntrinsicMesh, directions: Complexes) -> Floats:
 def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, guarded: Bools) -> JumpProblem:
     """Return the minimisation problem of Eq. 16, with one unknown constant per face and the weights of Eq. 15.
 
-    `slopes` are those of `corner_slopes`, (m, 3). Edges where `guarded`, (e,), is true get `SOURCE_CUT` times the
-    weight.
+    `slopes`, (m, 3), are the values at corners of functions with gradient Y that are zero at centroids. Edges where
+    `guarded`, (e,), is true get `SOURCE_CUT` times the weight.
     """
     offsets = pairs.ends(slopes)
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]

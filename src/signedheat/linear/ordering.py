@@ -118,7 +118,8 @@ def _levels(
 ) -> int:
     """Search the nodes whose region is `current` breadth first from a seed, and return the end of the queue.
 
-    The nodes are written to the queue from `begin` on, and their distances from the seed to `level`.
+    The neighbours of node i are ``neighbors[starts[i] : starts[i + 1]]``. The nodes are written to the queue from
+    `begin` on, and their distances from the seed to `level`, which is −1 for nodes that may still be reached.
     """
     level[seed] = 0
     queue[begin] = seed

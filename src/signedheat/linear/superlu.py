@@ -77,7 +77,10 @@ def _factored(matrix: sparse.csc_matrix) -> tuple[sparse.csc_matrix, Floats, NDA
 def _substitute(
     starts: NDArray[np.int32], rows: NDArray[np.int32], lower: NDArray[Any], pivots: Floats, x: NDArray[Any]
 ) -> None:
-    """Replace the right-hand side x, (n,), by the solution y of ``L D Lᴴ y = x``; L is stored by columns."""
+    """Replace the right-hand side x, (n,), by the solution y of ``L D Lᴴ y = x``, with the (n,) `pivots` D.
+
+    Entries ``starts[j]`` to ``starts[j + 1]`` of `lower` and `rows` are column j of L and its rows, the diagonal first.
+    """
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
             x[rows[k]] -= lower[k] * x[j]

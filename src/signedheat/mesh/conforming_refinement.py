@@ -253,7 +253,7 @@ class FaceCutter:
             self.pieces.append(NewSegment(*ends, -1, edge, vector, self.merged.owners[p]))
 
     def assemble(self) -> tuple[IntrinsicMesh, MergedSources, Bools, Ints]:
-        """Put the cut mesh and its sources together; the result is that of the function `cut_along`."""
+        """Return the cut mesh, its sources, (m,) whether each face is new, and (m,) the face that each is part of."""
         triangles, merged = self.triangles, self.merged
         kept = np.setdiff1d(np.arange(triangles.n_faces), self.cut_faces)
         parents = np.concatenate([kept, [f.parent for f in self.faces]]).astype(np.int64)

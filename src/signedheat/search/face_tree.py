@@ -165,7 +165,11 @@ class FaceTree:
     def of_triangles(
         cls, triangles: Floats, trusted: NDArray[np.float32] | None = None, bounding: Bools | None = None
     ) -> FaceTree:
-        """Build the tree of (m, 3, 3) triangles; `trusted` and `bounding` are as for `FaceFeatures.of`."""
+        """Build the tree of (m, 3, 3) triangles.
+
+        `trusted`, (m,), is the confidence in each, by default 1. `bounding`, (m,), says whether each bounds the inside,
+        by default all do.
+        """
         faces = np.arange(3 * len(triangles)).reshape(-1, 3)
         return cls.of(FaceFeatures.of(triangles.reshape(-1, 3), faces, trusted, bounding))
 

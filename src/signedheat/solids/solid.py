@@ -820,7 +820,11 @@ class Solid(Displayed, Represented, Frozen):
         files.save_solid(self, path)
 
     def _closest(self, points: Floats) -> tuple[NDArray[Any], ...]:
-        """Return the attributes of `Closest`, in order, for (n, 3) points."""
+        """Return what `Closest` holds, in order, for (n, 3) points.
+
+        That is (n,) signed distances, (n, 3) nearest points, (n,) faces or −1, (n, 3) barycentric coordinates or NaN,
+        (n, 3) gradients and (n,) confidence.
+        """
         nearest = self.tree.search(points)
         ids = self.features.ids[nearest.faces]  # of triangles of the solid; `origins` are faces of its source
         signs = np.where(self.windings.inside_near(points, nearest), -1.0, 1.0)

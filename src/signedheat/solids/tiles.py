@@ -223,7 +223,10 @@ def coarser(grid: Grid, factor: int) -> Grid:
 
 
 def blocks_near(tree: FaceTree, grid: Grid, reach: float, limit: int) -> tuple[Ints, int]:
-    """(n, 3) indices of the blocks that may have a node within reach of a face, or none: see `blocks_where`."""
+    """(n, 3) indices of the blocks that may have a node within reach of a face, and 1.
+
+    If they are more than `limit`, none, and the factor by which cells must be larger.
+    """
     diagonal = float(np.linalg.norm(grid.spacing))
     return blocks_where(grid, lambda centres, half: tree.distances(centres) <= reach + half * diagonal, limit)
 

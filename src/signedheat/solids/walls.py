@@ -41,7 +41,11 @@ class Rim:
 
     @classmethod
     def of(cls, ids: Ints, corners: Floats, behind: Floats, parts: Ints) -> Rim:
-        """Return the rim of a loop of vertices; `behind` is the third corner of the face at each edge."""
+        """Return the rim of a loop of (n,) vertices at the (n, 3) `corners`.
+
+        `behind`, (n, 3), is the third corner of the face at each edge, and `parts`, (n,), the connected part that ends
+        there.
+        """
         along = np.roll(corners, -1, axis=0) - corners
         away = corners - behind
         away -= ((away * along).sum(axis=1) / np.maximum((along * along).sum(axis=1), 1e-300))[:, None] * along

@@ -231,7 +231,9 @@ def opposed_normals(points: Floats, normals: Floats, flat: Floats, ids: Ints) ->
 def _unfolded(points: Floats, normals: Floats, axes: Floats, outward: Floats, flat: Floats, pairs: Ints) -> Floats:
     """(m, 2) coordinates of the second point of each pair in the tangent plane of the first: `TangentPlanes.unfolded`.
 
-    `pairs` are (m, 2) ids; the other arguments are attributes of `TangentPlanes`.
+    `pairs` are (m, 2) ids of points. For each point there are its unit normal, (n, 3), two `axes` in its tangent plane,
+    (n, 2, 3), a unit vector `outward` in that plane, away from neighbours on the same side, (n, 3), and in `flat`,
+    (n,), the height above the plane up to which points count as lying in it.
     """
     result, middle, seen = np.empty((len(pairs), 2)), np.empty(3), np.empty(3)
     for row in range(len(pairs)):

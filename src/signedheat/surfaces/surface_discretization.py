@@ -120,7 +120,11 @@ class SurfaceDiscretization:
         return surface_source(self.triangles, sources, diffusion, self.spacing)
 
     def diffuse(self, source: Any) -> list[Complexes]:
-        """Solve ``(M + tL) X = X₀`` (Eq. 12): (e, c) vectors in edge frames for each stage, see `VectorHeat.solve`."""
+        """Solve ``(M + tL) X = X₀`` (Eq. 12): a list of stages, each (e, c) vectors in edge frames.
+
+        The columns are X, or if it is extrapolated X, R X and R² X, with ``R = (M + tL)⁻¹ M``. Each later stage has
+        values only at edges where the one before has underflowed, and NaN elsewhere.
+        """
         return self.diffuse_many([source])[0]
 
     def diffuse_many(self, sources: Sequence[Any]) -> list[list[Complexes]]:

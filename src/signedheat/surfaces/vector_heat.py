@@ -162,7 +162,8 @@ def _local_entries(triangles: IntrinsicMesh, time: float, faces: Ints | slice) -
 def _real_form(triangles: IntrinsicMesh, diagonal: np.ndarray, factor: np.ndarray) -> sparse.csr_matrix:
     """Assemble the real (2e, 2e) matrix of blocks ``B_feᵀ B_fg``, whose columns B_fe are the axes of edge e in face f.
 
-    `diagonal` and `factor` are those of `_local_entries`.
+    These are weighted by the entries of ``M + tL`` before rotation: `diagonal`, (m, 3), at the edges of each face, and
+    `factor`, (m, 3), between each edge and the next.
     """
     edge, z = triangles.edges.face_edges, triangles.edge_directions
     rows, columns = edge.ravel(), np.roll(edge, -1, axis=1).ravel()
