@@ -245,8 +245,9 @@ def run_on_each(
 ) -> sh.batches.Batch:
     """Run a job on every input with its results in a folder, and report shapes that fail on standard error.
 
-    If `line` is given, it returns a line to print for each shape that is done, from the figures of the job. `options`
-    are further arguments of `signedheat.batches.run`.
+    ``job(path, stem)`` writes files whose names begin with `stem`, and returns figures. If `line` is given,
+    it returns a line to print for each shape that is done, from the figures of the job. `options` are further arguments
+    of `signedheat.batches.run`.
     """
     with ProgressBar(is_quiet(arguments)) as progress:
 

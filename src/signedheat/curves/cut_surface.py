@@ -298,7 +298,10 @@ class CutInterpolant:
         return shaped((self.values[places.faces] * places.barycentric).sum(axis=1), shape)
 
     def gradient(self, points: Any) -> Floats:
-        """Return (..., 3) gradients, as vectors in space, at points as for a call."""
+        """Return (..., 3) gradients, as vectors in space, at (..., 3) points, or those of a `Curve` or `SurfacePoints`.
+
+        Triangles of an intrinsic triangulation are not flat in space: it finds the gradients itself.
+        """
         faces, weights, shape = placed(self._mesh, points)
         if isinstance(self.domain.surface, IntrinsicTriangulation):
             return shaped(self.domain.surface.gradient(self.values, faces, weights), shape)

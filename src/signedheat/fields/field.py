@@ -255,9 +255,10 @@ class Field(Displayed, Frozen, Generic[Domain]):
 
     @property
     def cell_gradients(self) -> Floats:
-        """(m, 3) gradients of the field φ in m triangles or tets, with φ linear in each; 0 in degenerate triangles.
+        """(m, 3) gradients of the field φ in each tet or triangle, with φ linear in it; 0 in degenerate triangles.
 
-        Where φ was computed on finer triangles, `gradient` is more accurate. Fields on grids have no such cells.
+        They are in the order of the tets of the domain, or of the faces of its ``triangulation``. Where φ was
+        computed on finer triangles, `gradient` is more accurate. Fields on grids have no such cells.
         """
         gradients = getattr(self.restrict()._interpolant, "cell_gradients", None)
         if gradients is None:

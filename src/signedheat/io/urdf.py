@@ -48,7 +48,8 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
 def _path_of_mesh(robot: Path, name: str) -> Path:
     """Return the path of a mesh that the description of a robot names.
 
-    If there is no such file, it is a path relative to the folder of the description.
+    ``package://name/rest`` is looked for, with and without `name`, in the folder of the description and in all folders
+    that contain it. If there is no such file, it is a path relative to the folder of the description.
     """
     scheme, separator, rest = name.partition("://")
     if scheme == "file" and separator:

@@ -125,9 +125,9 @@ def without_seams(segments: Floats) -> Floats:
 
 
 def _united(outlines: list[Floats]) -> Any:
-    """Return the region that outlines fill by the rule "nonzero", after outermost outlines get the same direction.
+    """Return the region that outlines, (k, 2) each, fill by the rule "nonzero" if all outermost ones run the same way.
 
-    Outlines inside another are flipped together with it.
+    It is a `CrossSection` of manifold3d. Outlines inside another are flipped together with it.
     """
     nonzero = manifold3d.FillRule.NonZero
     parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
@@ -142,7 +142,7 @@ def _united(outlines: list[Floats]) -> Any:
             if (parts[inner] - parts[outer]).area() <= AREA_ROUNDING * areas[inner]:
                 outermost[inner] = outermost[outer]
                 break
-    turned = runs_back != runs_back[outermost]
+    turned = runs_back != runs_back[outermost]  # `to_polygons` makes each counter-clockwise: holes are reversed again
     polygons = [
         polygon[:: -1 if turn else 1]
         for part, turn in zip(parts, turned, strict=True)

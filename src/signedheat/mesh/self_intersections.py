@@ -26,9 +26,10 @@ CROWD = 64
 
 
 def self_intersections(vertices: Floats, faces: Ints, asked: Bools | None = None) -> Ints:
-    """Return (k, 2) pairs of faces that intersect, overlap or touch without a common vertex.
+    """Return (k, 2) pairs of faces that intersect or overlap, and those that touch and have no common vertex.
 
-    If `asked`, (m,), is given, only pairs with a face for which it is true are returned.
+    Vertices at the same position are one. If `asked`, (m,), is given, only pairs with a face for which it is
+    true are returned.
     """
     faces = same_positions(vertices)[faces]
     return overlapping_faces(vertices, faces, tolerances(vertices, faces, TOUCHING_DEPTH), asked)

@@ -250,7 +250,9 @@ def blocks_where(grid: Grid, near: Callable[[Floats, float], Bools], limit: floa
 def _cubes(grid: Grid, near: Callable[[Floats, float], Bools], few: int | None) -> Iterator[tuple[int, Ints, float]]:
     """Yield the cubes that `near` accepts, from coarse to fine: blocks per edge, (k, 3) indices, and their number.
 
-    If there are more than `few`, only so many are divided, and the number is an estimate. None means no limit.
+    `near` takes (k, 3) centres in space and half the edge of a cube, in nodes, and returns (k,) bool. Indices count
+    cubes of the same size. If there are more than `few`, only so many are divided, and the number is an estimate. None
+    means no limit.
     """
     n_blocks = -(-np.array(grid.shape) // BLOCK)
     side, weight, random = 1 << max(0, int(np.ceil(np.log2(n_blocks.max())))), 1.0, np.random.default_rng(0)

@@ -209,7 +209,10 @@ def numbers_kept(n: int, left_out: WithoutLength | None) -> Ints:
 
 
 def numbers_given(sources: Sequence[Any], left_out: WithoutLength | None) -> Ints:
-    """(k,) numbers of all curves in the sources that were kept, counting every curve of a group, and those left out."""
+    """(k,) index of each curve that was kept in the list of all curves given, with groups unpacked.
+
+    `sources` are those kept. Curves that were `left_out` have an index, too, but are not returned.
+    """
     kept = numbers_kept(len(sources), left_out)
     counts = np.ones(kept.max(initial=-1) + 1, dtype=np.int64)
     counts[kept] = [len(source) if isinstance(source, Sequence) else 1 for source in sources]

@@ -117,7 +117,12 @@ def _(
 def nearest_zero(
     surface: SurfaceDiscretization, values: Floats, source: SourceTerm | None, tolerance: float, report: Report | None
 ) -> Nearest:
-    """Measure distance to the zero set of φ, and to the unoriented curves and points that φ was computed from."""
+    """Measure distance to the zero set of φ, and to the unoriented curves and points that φ was computed from.
+
+    `values` are φ at the vertices, (n,), and distances have errors below `tolerance` times the lengths of edges. Where
+    all sources are unoriented, sides are 1, elsewhere 0: the sign of φ counts. Zeros of φ near an unoriented source
+    that no oriented one meets are due to it alone, and left out.
+    """
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
     sides = np.zeros(len(values), dtype=np.int64)
     if not isinstance(source, SurfaceSource) or not unsided:
