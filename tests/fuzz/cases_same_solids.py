@@ -20,8 +20,8 @@ GRAIN = 2.0**-20
 NEAR = 1e-6
 """Points nearer to the surface than this share of the size may have either sign."""
 BY_HEAT = 1e-2
-"""How far distances to loose triangles, which heat closes, may be apart, relative to the size: other grids, which
-depend on all that is there, change them by up to 3e-3."""
+"""How far distances to loose triangles, which heat closes, may be apart, relative to the size. Differences up
+to 3e-3 were seen where something was added far away. Their cause is not known, and the limit is not swept."""
 ITERATED = 1e-5
 """How far volumes may be apart, relative to the cube of the size: heat, which closes soups, is iterated to 1e-6."""
 
