@@ -118,3 +118,14 @@ def test_a_single_source_is_drawn_as_a_list_of_it_is(tmp_path):
     for name, given in (("one", source), ("list", [source])):
         view.save_surface(field, tmp_path / f"{name}.png", given)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "list.png").read_bytes()
+
+
+def test_angles_and_the_direction_that_they_mean_show_the_same():
+    ball = sh.samples.sphere(2)
+    field = sh.signed_distance(ball.level_set(ball.vertices[:, 2], 0.2), ball)
+    pictures = []
+    for seen_from in ((30.0, -60.0), view.surface_pictures.oblique(30.0, -60.0)):
+        axes = view.new_figure(2, 2).add_subplot()
+        view.draw_surface(field, axes, view=seen_from)
+        pictures.append(axes.images[0].get_array())
+    np.testing.assert_array_equal(*pictures)

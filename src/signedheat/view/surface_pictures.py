@@ -332,7 +332,7 @@ def draw_surface(
     axes: Axes,
     sources: CurveOrPoints | Sequence[CurveOrPoints | Sequence[CurveOrPoints]] = (),
     n_contours: int = 20,
-    view: Floats | None = None,
+    view: Floats | tuple[float, float] | None = None,
     up: int = 2,
     colors: ScalarMappable | None = None,
 ) -> None:
@@ -348,8 +348,9 @@ def draw_surface(
         The sources to draw, in yellow; none by default.
     n_contours : int
         The approximate number of isolines, 20 by default; 0 for none.
-    view : (3,) float, optional
-        The direction from the surface to the eye; by default a side that shows the sources.
+    view : (3,) or (2,) float, optional
+        The direction from the surface to the eye, or its elevation and azimuth in degrees; by default a side that shows
+        the sources.
     up : int
         The axis that points up in the picture: 0, 1 or 2.
     colors : matplotlib.cm.ScalarMappable, optional
@@ -358,7 +359,9 @@ def draw_surface(
     source_mesh, mesh, values = _source_mesh_and_painted(field)
     given = sources if isinstance(sources, Sequence) else [sources]
     flat = [item for source in given for item in (source if isinstance(source, Sequence) else [source])]
-    direction = toward_sources(source_mesh, flat, up) if view is None else view
+    direction = toward_sources(source_mesh, flat, up) if view is None else np.asarray(view, dtype=np.float64)
+    if len(direction) == 2:
+        direction = oblique(direction[0], direction[1], up)
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
     corners = camera.pixels(mesh.vertices)[mesh.faces]
     depth, face, phi = rasterize(corners, values[mesh.faces], camera.width, camera.height)
