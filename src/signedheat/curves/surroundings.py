@@ -21,7 +21,8 @@ REACH = 1.0
 taken whole, distance to circles in one to six arcs changes by at most 0.8 % of the extent, a finer mesh changes it by
 as much. Halved it is 1.5 %, doubled 0.5 %."""
 LARGEST_SHARE = 0.25
-"""Share of the faces above which the surroundings are the whole mesh. It decides on the time alone."""
+"""Share of the faces above which the surroundings are the whole mesh, as too little time would be saved. An answer may
+change by as much as `REACH` allows where something added far away makes the share smaller than this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,19 +38,15 @@ class Surroundings:
     def of(cls, whole: TriangleMesh, segments: Sequence[CurveSegments]) -> Surroundings | None:
         """Return the surroundings of segments on a mesh; None if they are most of it, or there are no segments."""
         crossed = np.concatenate([np.concatenate([part.nodes.faces, part.faces]) for part in segments])
-        points = np.concatenate([positions_of_nodes(whole, part) for part in segments])
+        nodes = [positions_of_nodes(whole, part) for part in segments]
         lengths = np.concatenate([part.lengths for part in segments])
         if lengths.sum() == 0:
             return None
-        middles = np.concatenate([positions_of_nodes(whole, part)[part.ends].mean(axis=1) for part in segments])
-        center = np.average(middles, axis=0, weights=lengths)
+        middles = [each[part.ends].mean(axis=1) for each, part in zip(nodes, segments, strict=True)]
+        points, center = np.concatenate(nodes), np.average(np.concatenate(middles), axis=0, weights=lengths)
         reach = REACH * 2 * float(np.linalg.norm(points - center, axis=1).max())
-        in_box = ((whole.vertices >= points.min(axis=0) - reach) & (whole.vertices <= points.max(axis=0) + reach)).all(
-            axis=1
-        )
-        if np.mean(in_box) > 2 * LARGEST_SHARE:  # a box around a part of a surface has little else in it
-            return None
-        near = np.flatnonzero(in_box)
+        low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
+        near = np.flatnonzero(((whole.vertices >= low) & (whole.vertices <= high)).all(axis=1))
         near = near[PointTree(points).query(whole.vertices[near], distance_upper_bound=reach)[0] <= reach]
         is_near = mask_of(whole.n_vertices, near)[whole.faces].any(axis=1)
         chosen = is_near | mask_of(whole.n_faces, crossed)
