@@ -15,7 +15,7 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from .box_tree import BoxTree
 from .components import connected_components, grouped, members_of, numbered, sums_of
-from .edges import EdgeTable, edge_table
+from .edges import EdgeTable, edge_table, has_three_corners
 from .planar_triangulation import triangulate_faces
 from .self_intersections import overlapping_faces
 from .triangles import face_areas, heights
@@ -100,7 +100,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
     busy = np.unique(faces[pairs.ravel()])
     reaches = _reaches(len(points), faces, slacks)
     faces = _welded(points, busy, reaches)[faces]
-    proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+    proper = np.flatnonzero(has_three_corners(faces))
     proper = proper[heights(points[faces[proper]]) > slacks[proper]]
     number = np.full(int(faces.size), -1)
     number[proper] = np.arange(len(proper))

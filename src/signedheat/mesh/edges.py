@@ -166,6 +166,12 @@ class EdgeTable(Frozen):
         return np.argsort((np.minimum(a, b) + 1) * len(vertex_order) - np.maximum(a, b), kind="stable")
 
 
+def has_three_corners(faces: Ints) -> Bools:
+    """Return (m,) whether the corners of each of (m, 3) triangles are three different vertices."""
+    a, b, c = faces.T
+    return np.asarray((a != b) & (b != c) & (c != a))
+
+
 def edge_table(faces: Ints) -> EdgeTable:
     """Find the edges of (m, 3) triangles, numbered by first appearance (corner 0–1, 1–2, 2–0, face after face)."""
     faces = np.asarray(faces, dtype=np.int64)

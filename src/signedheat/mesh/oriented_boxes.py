@@ -11,9 +11,6 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from .box_tree import boxes_around
-from .triangles import area_vectors
-from .unit_vectors import unit
 
 TRIANGLES_PER_LEAF = 8
 """Number of triangles in each leaf. To compare the boxes of so few takes less time than to descend further."""
@@ -39,49 +36,74 @@ class OrientedBoxes(NamedTuple):
         """Build the tree over n triangles, with (n, 9) corners, (n,) slacks, (n,) hubs, and (n,) whether asked for."""
         leaves = 1 << max(int(np.ceil(np.log2(len(corners) / TRIANGLES_PER_LEAF))), 0)
         own = np.full((TRIANGLES_PER_LEAF * leaves, 10), -np.inf)
-        lower, upper = boxes_around(corners.reshape(-1, 3, 3))
-        for columns, values in zip(
-            np.split(own[: len(corners)], [3, 6, 7, 8, 9], axis=1),
-            (upper, -lower, slacks, asked, hubs, -hubs),
-            strict=True,
-        ):
-            columns[:] = values.reshape(columns.shape)
-        largest = np.full((2 * leaves, 10), -np.inf)
-        return cls(own, largest, _oriented(corners, _axes(corners.reshape(-1, 3, 3), leaves), own, largest))
-
-
-def _axes(triangles: Floats, leaves: int) -> Floats:
-    """Return (leaves, 9) three perpendicular unit vectors for each leaf, the first along the longest side in it.
-
-    The second is in the plane of that triangle, and the third its normal. They are 0 if the triangle is degenerate.
-    """
-    sides = np.roll(triangles, -1, axis=1) - triangles
-    squares = np.zeros((TRIANGLES_PER_LEAF * leaves, 3))
-    squares[: len(triangles)] = np.einsum("ncd,ncd->nc", sides, sides)
-    longest = 3 * TRIANGLES_PER_LEAF * np.arange(leaves) + squares.reshape(leaves, -1).argmax(axis=1)
-    chosen = np.minimum(longest // 3, len(triangles) - 1)
-    along = unit(sides[chosen, longest % 3])
-    normals = unit(area_vectors(triangles[chosen]))
-    return np.concatenate([along, np.cross(normals, along), normals], axis=1)
+        largest, oriented = np.full((2 * leaves, 10), -np.inf), np.zeros((2 * leaves, 15))
+        _write_boxes(corners, slacks, hubs, asked, own, largest, oriented)
+        return cls(own, largest, oriented)
 
 
 @compiled
-def _oriented(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Floats:
-    """Return (2 · leaves, 15) oriented boxes of nodes; also compute the numbers `largest` of each node.
+def _write_axes(corners: Floats, first: int, end: int, oriented: Floats, node: int) -> None:
+    """Write three perpendicular unit vectors for the triangles of a leaf to its row, the first along the longest side.
 
-    Boxes of leaves have the given axes, (leaves, 9), and those of other nodes the axes of their wider child.
+    The second is in the plane of that triangle, and the third its normal. They are 0 if the triangle is degenerate.
     """
-    leaves, points = len(axes), np.empty((max(16, 3 * TRIANGLES_PER_LEAF), 3))
-    oriented = np.zeros((2 * leaves, 15))
+    longest, chosen, start = -1.0, first, 0
+    for f in range(first, end):
+        for k in range(3):
+            square = 0.0
+            for d in range(3):
+                square += (corners[f, (3 * k + 3 + d) % 9] - corners[f, 3 * k + d]) ** 2
+            if square > longest:
+                longest, chosen, start = square, f, 3 * k
+    if not longest > 0.0:
+        return
+    length = np.sqrt(longest)
+    for d in range(3):
+        oriented[node, 6 + d] = (corners[chosen, (start + 3 + d) % 9] - corners[chosen, start + d]) / length
+        oriented[node, 9 + d] = (corners[chosen, (start + 6 + d) % 9] - corners[chosen, start + d]) / length
+    _write_cross(oriented, node, 6, 9, 12)
+    _write_cross(oriented, node, 12, 6, 9)
+
+
+@compiled
+def _write_cross(oriented: Floats, node: int, a: int, b: int, to: int) -> None:
+    """Write the unit vector across those at `a` and `b` in a row to place `to`; 0 if they are parallel."""
+    square = 0.0
+    for d in range(3):
+        e, f = (d + 1) % 3, (d + 2) % 3
+        value = oriented[node, a + e] * oriented[node, b + f] - oriented[node, a + f] * oriented[node, b + e]
+        oriented[node, to + d] = value
+        square += value * value
+    scale = 1.0 / np.sqrt(square) if square > 0.0 else 0.0
+    for d in range(3):
+        oriented[node, to + d] *= scale
+
+
+@compiled
+def _write_boxes(
+    corners: Floats, slacks: Floats, hubs: Ints, asked: Bools, own: Floats, largest: Floats, oriented: Floats
+) -> None:
+    """Write the numbers of triangles, `own`, and the largest numbers and the oriented boxes of nodes.
+
+    Boxes of leaves are as `_write_axes` turns them, and those of other nodes as that of their wider child.
+    """
+    leaves, points = len(largest) // 2, np.empty((max(16, 3 * TRIANGLES_PER_LEAF), 3))
     for node in range(2 * leaves - 1, 0, -1):
         count, wider, widest, first = 0, 0, -1.0, TRIANGLES_PER_LEAF * (node - leaves)
         if first >= 0:
-            for k in range(3 * first, 3 * min(first + TRIANGLES_PER_LEAF, len(corners))):
+            end = min(first + TRIANGLES_PER_LEAF, len(corners))
+            _write_axes(corners, first, end, oriented, node)
+            for f in range(first, end):
+                own[f, 6], own[f, 7], own[f, 8], own[f, 9] = slacks[f], 1.0 if asked[f] else 0.0, hubs[f], -hubs[f]
                 for d in range(3):
-                    points[count, d] = corners[k // 3, k % 3 * 3 + d]
-                count += 1
+                    x, y, z = corners[f, d], corners[f, 3 + d], corners[f, 6 + d]
+                    own[f, d], own[f, 3 + d] = max(x, y, z), -min(x, y, z)
+                    points[count, d], points[count + 1, d], points[count + 2, d] = x, y, z
+                count += 3
         else:
             for child in range(2 * node, 2 * node + 2):
+                if largest[child, 6] == -np.inf:  # no triangles
+                    continue
                 a, b, c = oriented[child, 3], oriented[child, 4], oriented[child, 5]
                 if max(a * b, b * c, c * a) > widest:
                     wider, widest = child, max(a * b, b * c, c * a)
@@ -92,6 +114,8 @@ def _oriented(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Fl
                             way = oriented[child, 3 + e] * oriented[child, 6 + 3 * e + d]
                             points[count, d] += way if (k >> e) & 1 else -way
                     count += 1
+        if count == 0:
+            continue
         for k in range(10):
             for i in range(TRIANGLES_PER_LEAF if first >= 0 else 2):
                 value = own[first + i, k] if first >= 0 else largest[2 * node + i, k]
@@ -99,7 +123,8 @@ def _oriented(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Fl
         for k in range(3):
             square, least, most = 0.0, 0.0, 0.0
             for d in range(6 + 3 * k, 9 + 3 * k):
-                oriented[node, d] = axes[node - leaves, d - 6] if first >= 0 else oriented[wider, d]
+                if first < 0:
+                    oriented[node, d] = oriented[wider, d]
                 square += oriented[node, d] ** 2
             for i in range(count):  # from the first point, so that rounding is small
                 along = 0.0
@@ -111,7 +136,6 @@ def _oriented(corners: Floats, axes: Floats, own: Floats, largest: Floats) -> Fl
                 oriented[node, d] += 0.5 * (least + most) * oriented[node, 6 + 3 * k + d]
         for d in range(3):
             oriented[node, d] += points[0, d]
-    return oriented
 
 
 @compiled

@@ -10,6 +10,7 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, in_threads
 from .box_tree import boxes_around, morton_codes
+from .edges import has_three_corners
 from .oriented_boxes import TRIANGLES_PER_LEAF, OrientedBoxes, boxes_apart, oriented_apart
 from .unit_vectors import unit
 from .welding import same_positions, tolerances
@@ -41,7 +42,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bool
     Faces touch if their distance is below the (m,) slacks of both. Faces with a common edge overlap if one is folded
     onto the other. If `asked`, (m,), is given, only pairs with a face for which it is true are returned.
     """
-    proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+    proper = np.flatnonzero(has_three_corners(faces))
     if len(proper) < len(faces):
         asked_proper = None if asked is None else asked[proper]
         return proper[overlapping_faces(vertices, faces[proper], slacks[proper], asked_proper)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, mask_of, read_only
 from ..compiled import compiled
 from .components import connected_components
-from .edges import find_edges, pair_halfedges
+from .edges import find_edges, has_three_corners, pair_halfedges
 
 ONE_PLACE = 4.0
 """Largest difference between coordinates of points that count as coinciding, in units of single precision of the size
@@ -348,7 +348,7 @@ def copied_faces(faces: Ints, n_vertices: int) -> Ints:
     all of its vertices, if there is one.
     """
     first = np.arange(len(faces))
-    doubled = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
+    doubled = ~has_three_corners(faces)
     pairs = pair_halfedges(faces.ravel(), np.roll(faces, -1, axis=1).ravel(), n_vertices)
     crowded = np.flatnonzero((pairs.around > 2).reshape(-1, 3).any(axis=1))
     if len(crowded):

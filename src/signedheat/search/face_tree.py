@@ -19,7 +19,7 @@ from ..compiled import compiled
 from ..errors import SourceError
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
 from ..mesh.components import by_first_use, connected_components, sums_of
-from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.edges import EdgeTable, edge_table, has_three_corners
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import coincident_faces, same_positions, same_rows
 from ..parallel import in_chunks
@@ -77,8 +77,7 @@ class FaceFeatures(NamedTuple):
         faces = same_positions(vertices)[faces]
         trusted = np.ones(len(faces), dtype=np.float32) if trusted is None else trusted
         ids = np.arange(len(faces))
-        a, b, c = faces.T
-        proper = (a != b) & (b != c) & (c != a)
+        proper = has_three_corners(faces)
         if not proper.all():
             faces, trusted, ids = faces[proper], trusted[proper], ids[proper]
         if len(faces):  # faces near each other in space should be so in memory

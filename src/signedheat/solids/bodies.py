@@ -21,7 +21,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..mesh.arrangement import SAME_POINT, arranged
-from ..mesh.edges import edge_table, orient_faces
+from ..mesh.edges import edge_table, has_three_corners, orient_faces
 from ..mesh.pinches import separated
 from ..mesh.self_intersections import overlap, overlapping_faces
 from ..mesh.triangles import area_vectors, face_areas, halved, heights, part_volumes
@@ -57,14 +57,13 @@ class Bodies:
     def of_chain(cls, windings: Windings) -> Bodies | None:
         """Separate the bodies of a chain; None if edges cannot be paired, or if a body passes through itself."""
         points, faces = indexed(windings.triangles)
-        proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-        points, faces = separated(points, faces[proper], overlapping=True)
+        points, faces = separated(points, faces[has_three_corners(faces)], overlapping=True)
         return cls(points, faces, *part_volumes(points, faces))._clean
 
     @classmethod
     def of_mesh(cls, mesh: TriangleMesh, windings: Windings) -> Bodies | None:
         """Return the parts of a mesh, oriented as its chain is; None unless all are closed and orientable."""
-        faces = mesh.faces[(mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)]
+        faces = mesh.faces[has_three_corners(mesh.faces)]
         areas = face_areas(mesh.vertices[faces])
         oriented = orient_faces(faces, areas, mesh.n_vertices)
         if not oriented.orientable.all():

@@ -21,6 +21,7 @@ from ..linear.threads import one_blas_thread
 from ..memory import refuse_beyond_memory
 from ..mesh.arrangement import SAME_POINT
 from ..mesh.components import numbered
+from ..mesh.edges import has_three_corners
 from ..mesh.triangles import face_areas
 from ..mesh.unit_vectors import axes_across
 from ..mesh.welding import indexed, parts_by_place, tolerances
@@ -72,8 +73,7 @@ def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) ->
     strip = np.concatenate(
         [np.stack([tails, heads, nearest[heads]], axis=1), np.stack([tails, nearest[heads], nearest[tails]], axis=1)]
     )
-    a, b, c = strip.T
-    return points, np.concatenate([slivers, strip[(a != b) & (b != c) & (c != a)]])
+    return points, np.concatenate([slivers, strip[has_three_corners(strip)]])
 
 
 def small_gaps(vertices: Floats, faces: Ints) -> Ints:

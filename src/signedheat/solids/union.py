@@ -19,7 +19,7 @@ from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..errors import GeometryError, OutsideError, SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
 from ..mesh.components import element_components, first_members
-from ..mesh.edges import edge_table
+from ..mesh.edges import edge_table, has_three_corners
 from ..mesh.self_intersections import overlapping_faces
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.welding import indexed, same_positions, tolerances
@@ -58,7 +58,7 @@ def solid_as_given(mesh: TriangleMesh) -> Solid | None:
     points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
     table = edge_table(faces)
     is_closed = (table.face_counts == 2).all() and not table.balance.any()
-    if not is_closed or (faces == np.roll(faces, 1, axis=1)).any() or element_components(faces).any():
+    if not is_closed or not has_three_corners(faces).all() or element_components(faces).any():
         return None
     triangles = points.take(faces, axis=0)
     corners = triangles - triangles[0, 0]  # so that no digits cancel far away
@@ -68,9 +68,8 @@ def solid_as_given(mesh: TriangleMesh) -> Solid | None:
     if len(overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT))):
         return None
     all_bounding, full_confidence = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
-    return Solid(
-        triangles, np.arange(len(faces)), full_confidence, all_bounding, Windings(triangles), mesh, uncrossed=True
-    )
+    windings = Windings(triangles, open_edges=points[table.vertices[table.balance != 0]])
+    return Solid(triangles, np.arange(len(faces)), full_confidence, all_bounding, windings, mesh, uncrossed=True)
 
 
 def united(

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..mesh.components import connected_components, next_in_groups
+from ..mesh.edges import has_three_corners
 from ..mesh.triangles import side_lengths
 from ..mesh.unit_vectors import SAME_WAY, unit
 from ..parallel import PointTree
@@ -242,4 +243,4 @@ def _zipped(first_ids: Ints, first_points: Floats, second_ids: Ints, second_poin
             rows.append((first_ids[a], second_ids[b + 1], second_ids[b]))
             b += 1
     faces = np.array(rows)
-    return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])
+    return np.asarray(faces[has_three_corners(faces)])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from functools import cached_property
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Frozen
 from ..errors import GeometryError, counted
-from ..mesh.edges import edge_table
+from ..mesh.edges import edge_table, has_three_corners
 from ..mesh.welding import same_positions
 from ..search.face_tree import NearestFaces
 from ..search.winding_tree import OFF_FACE, WindingTree, steps_off, winding_sums
@@ -29,9 +29,10 @@ class Windings(Frozen):
     """Winding numbers of triangles with balanced edges: integers, which change only across the triangles."""
 
     triangles: Floats  # (m, 3, 3) corners
+    open_edges: InitVar[Floats | None] = None  # (n, 2, 3) ends of the edges that do not balance, if they are known
 
-    def __post_init__(self) -> None:
-        ends = open_edges_of(self.triangles)
+    def __post_init__(self, open_edges: Floats | None) -> None:
+        ends = open_edges_of(self.triangles) if open_edges is None else open_edges
         if len(ends):
             x, y, z = ends[0].mean(axis=0)
             raise GeometryError(
@@ -80,6 +81,5 @@ def open_edges_of(triangles: Floats) -> Floats:
     """(n, 2, 3) ends of edges of (m, 3, 3) triangles at which opposite directions do not balance."""
     corners = triangles.reshape(-1, 3)
     faces = same_positions(corners).reshape(-1, 3)
-    a, b, c = faces.T
-    table = edge_table(faces[(a != b) & (b != c) & (c != a)])
+    table = edge_table(faces[has_three_corners(faces)])
     return corners[table.vertices[table.balance != 0]]

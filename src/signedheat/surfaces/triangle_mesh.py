@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays import Floats, Ints
 from ..errors import GeometryError, counted
-from ..mesh.edges import EdgeTable, edge_table
+from ..mesh.edges import EdgeTable, edge_table, has_three_corners
 from ..mesh.intrinsic_mesh import TRIANGLE_MARGIN, IntrinsicMesh, laid_out
 from ..mesh.triangles import area_vectors
 from ..mesh.welding import ONE_PLACE, SEAM_UNITS, copied_faces, joined_rims
@@ -168,7 +168,7 @@ class TriangleMesh(Exchangeable["trimesh.Trimesh"], Surface):
         """
         tails, heads = self.faces.ravel(), np.roll(self.faces, -1, axis=1).ravel()
         faces = joined_rims(self.vertices, tails, heads, ONE_PLACE)[self.faces]
-        return faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
+        return faces[has_three_corners(faces)]
 
     @cached_property
     def edge_lengths(self) -> Floats:
