@@ -29,6 +29,7 @@ PACKAGES = {
     "dae": ("trimesh", "collada"),
     "cells": ("meshio",),
     "nifti": ("nibabel",),
+    "dxf": ("ezdxf",),
 }
 """What each parser imports."""
 

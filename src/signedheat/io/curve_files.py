@@ -21,11 +21,10 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface import closest_points
 from ..surfaces.surface_curves import Curve, CurveOrPoints, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import numbers
-from .budgets import JSON, charge_tree
-from .files import PathLike, format_for, reading, replacing, text
+from ..validation import flag, numbers
+from .files import PathLike, damaged, format_for, reading, replacing, text
 from .mesh_files import read_obj_elements
-from .numerals import integer, integers
+from .numerals import integer, integers, json_of, vector
 from .point_files import read_point_lists
 
 GROUP_KINDS = SIGNED, UNSIGNED, POINTS = "signed_curve", "unsigned_curve", "unsigned_point"
@@ -238,19 +237,17 @@ def polylines_of_segments(kind: str, nodes: list[Node], segments: Sequence[tuple
 def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Curve]:
     """Read vertex ids and weights, or polylines in space, from JSON."""
     try:
-        written = text(path)
-        charge_tree(written, JSON)
-        content = json.loads(written)
+        content = json_of(text(path))
         if "polylines" not in content:
             return groups_of(content)
         lines = [
-            (numbers(line["points"], "points", FileFormatError), bool(line.get("closed", False)))
+            (numbers(line["points"], "points", FileFormatError), flag(line.get("closed", False), "closed"))
             for line in content["polylines"]
         ]
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         if isinstance(error, SignedHeatError):
             raise
-        raise FileFormatError(f"these are not curves with vertex ids and weights ({error!r})") from error
+        raise damaged(f"these are not curves with vertex ids and weights ({error!r})") from error
     return [domain.polyline(points, closed=closed) for points, closed in lines]
 
 
@@ -261,12 +258,12 @@ def groups_of(content: dict[str, Any]) -> list[Group]:
         nodes = [
             Node(
                 tuple((integers(node["v"], "vertex ids", 0) - base).tolist()),
-                tuple(numbers(node["w"], "weights", FileFormatError).tolist()),
+                tuple(vector(node["w"], "weights", len(node["v"])).tolist()),
             )
             for node in group["nodes"]
         ]
-        if any(len(n.vertices) != len(n.weights) or not 0 < len(n.vertices) <= 3 for n in nodes):
-            raise ValueError("a node needs one to three vertices and as many weights")
+        if not all(0 < len(node.vertices) <= 3 for node in nodes):
+            raise ValueError("a node needs one to three vertices")
         if group["kind"] == POINTS:
             groups.append(Group(POINTS, nodes))
         elif group["kind"] in (SIGNED, UNSIGNED):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import json
 import math
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -20,8 +19,9 @@ from ..errors import FileFormatError, GeometryError
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
 from ..shapes.geometries import geometry_of, polylines_of
-from .budgets import XML, charge, charge_tree
-from .files import PathLike, contents, damaged, format_for, reading, replacing
+from .budgets import XML, charge, charge_tree, charge_words
+from .files import PathLike, contents, damaged, format_for, reading, replacing, text
+from .numerals import finite_numbers, integers, json_of
 from .point_files import read_point_lists, write_point_lists
 from .sandbox import parsed
 
@@ -211,9 +211,17 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
         return 0.0
     if match is None or (unit != "%" and unit not in SVG_UNITS):
         raise damaged(f"{name} is '{word:.40}', which is not a length", element=name)
-    value = float(match[1]) * (whole / 100 if unit == "%" else SVG_UNITS[unit])
+    value = _finite(match, name) * (whole / 100 if unit == "%" else SVG_UNITS[unit])
     if not math.isfinite(value):
         raise FileFormatError(f"{name} is '{word:.40}' of a drawing without a size", remedy="give it a viewBox")
+    return value
+
+
+def _finite(match: re.Match[str], name: str) -> float:
+    """Return the number that `NUMBER` or `FLAG` matched; raise an error if it is too large for a float."""
+    value = float(match[1])
+    if math.isinf(value):
+        raise damaged(f"{name} has a number that is too large, {match[1]:.40}", element=name)
     return value
 
 
@@ -230,7 +238,7 @@ def _numbers(text: str, name: str) -> list[float]:
         match = NUMBER.match(text, position)
         if match is None:
             raise damaged(f"{name} has '{text[position : position + 20].strip()}' where a number must be", element=name)
-        numbers.append(float(match[1]))
+        numbers.append(_finite(match, name))
         position = match.end()
     return numbers
 
@@ -291,7 +299,7 @@ def _steps(data: str) -> Iterator[tuple[str, list[float]]]:
                     f"a path has '{data[position : position + 20].strip()}' where a number of '{command}' must be"
                 )
             position = number.end()
-            numbers.append(float(number[1]))
+            numbers.append(_finite(number, "a path"))
         yield command, numbers
         command = {"M": "L", "m": "l"}.get(command, command)
 
@@ -507,15 +515,22 @@ def write_polylines(lines: Polyline | Sequence[Polyline], path: PathLike) -> Non
 
 def read_geojson(path: PathLike) -> list[tuple[Floats, bool]]:
     """Return the (n, 2) points of lines and of the rings of polygons in GeoJSON, and whether each is closed."""
-    try:
-        geometry = geometry_of(json.loads(contents(path)))
-    except (ValueError, RecursionError) as error:
-        raise damaged(f"it is not JSON ({error})") from error
+    geometry = geometry_of(json_of(contents(path)))
     if geometry is None:
         raise damaged("it holds no geometry")
     return [(line.points, line.closed) for line in polylines_of(geometry)]
 
 
+DXF_KINDS: dict[int, type] = {
+    code: kind
+    for kind, ranges in (
+        (float, ((10, 60), (110, 150), (210, 240), (460, 470), (1010, 1060))),
+        (int, ((60, 80), (90, 100), (160, 180), (270, 300), (370, 390), (400, 410), (420, 430), (440, 460))),
+    )
+    for codes in ranges
+    for code in range(*codes)
+}
+"""Types of the values of DXF groups by their codes."""
 DXF_SAG = 1e-3
 """Largest distance of a segment from the arc or spline that it approximates, relative to the drawing's size."""
 
@@ -528,11 +543,27 @@ def read_dxf(path: PathLike) -> list[tuple[Floats, bool]]:
     Such files have no rule for filling, and parts with holes are drawn as outlines that run either way: closed ones
     become the outlines of what lies within an odd number of them, copies left out.
     """
+    content = contents(path)
+    if not content.startswith(b"AutoCAD Binary DXF"):
+        _refuse_wrong_groups(text(path))
     drawing = parsed("dxf", path, "ezdxf", ".dxf files", sag=DXF_SAG)
     lines = np.split(drawing["points"], np.cumsum(drawing["counts"])[:-1])
     drawn = [Polyline(p, len(p) > 2 and bool((p[0] == p[-1]).all())) for p in lines if (p != p[0]).any()]
     outlines, _, _ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", 1 / FINEST_DRAWING)
     return [(line.points, line.closed) for line in outlines]
+
+
+def _refuse_wrong_groups(content: str) -> None:
+    """Raise `FileFormatError` if lines of a DXF drawing that must hold numbers hold anything else.
+
+    Codes and values stand on alternate lines, and a code says what the value is.
+    """
+    charge_words(content)
+    lines = content.rstrip().split("\n")
+    codes, values = integers([line.strip() for line in lines[::2]], "group codes", 0).tolist(), lines[1::2]
+    groups = list(zip(map(DXF_KINDS.get, codes), values, strict=False))  # a value may lack at the end
+    finite_numbers([value.strip() for kind, value in groups if kind is float], "coordinates")
+    integers(finite_numbers([value.strip() for kind, value in groups if kind is int], "counts"), "counts")
 
 
 POLYLINE_READERS: dict[str, Callable[[PathLike], list[tuple[Floats, bool]]]] = {

@@ -27,6 +27,7 @@ from ..tets.tet_mesh import TetMesh
 from .files import PathLike, contents, damaged, ensure_writable, extension, format_for, reading, replacing
 from .image_files import CONFIDENCE, read_image, write_nrrd
 from .mesh_files import write_obj
+from .numerals import integers
 from .numpy_files import names_in_npz, read_npz, write_npz
 from .ply import read_ply, write_ply
 from .solid_arrays import SOLID_ARRAYS, SOURCE_ARRAYS, arrays_of, solid_of
@@ -212,7 +213,10 @@ def load_vertex_field(path: PathLike) -> Field[SurfaceShape]:
         arrays = read_npz(path, ("faces", "offsets", *OF_CLOUDS), needed=("vertices", "values"))
         vertices, values = arrays["vertices"], arrays["values"]
         if "offsets" in arrays:
-            domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], arrays["offsets"][1:-1]))
+            offsets = integers(arrays["offsets"], "offsets", 0)
+            if offsets.ndim != 1 or (np.diff(offsets, prepend=0, append=arrays["faces"].size) < 0).any():
+                raise damaged("its offsets decrease, or go beyond its faces", element="offsets")
+            domain: SurfaceShape = PolygonMesh(vertices, np.split(arrays["faces"], offsets[1:-1]))
         elif "faces" in arrays:
             domain = TriangleMesh(vertices, arrays["faces"])
         else:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -15,9 +14,9 @@ from numpy.typing import NDArray
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
 from ..shapes.transforms import Body, placed
-from .budgets import BYTES_PER_PLACED, JSON, charge, charge_tree
+from .budgets import BYTES_PER_PLACED, charge
 from .files import PathLike, companion_contents, contents, damaged
-from .numerals import integer, integers
+from .numerals import integer, integers, json_of, vector
 
 COMPONENT_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 """NumPy types of the numbers of an accessor, by its code ``componentType``."""
@@ -137,8 +136,7 @@ def _read_scene(path: PathLike) -> _Scene:
         json_end = 20 + int.from_bytes(data[12:16], "little")
         text = data[20:json_end]
         embedded = data[json_end + 8 : json_end + 8 + int.from_bytes(data[json_end : json_end + 4], "little")]
-    charge_tree(text, JSON)
-    tree = json.loads(text.decode("utf-8-sig"))
+    tree = json_of(text)
     version = str(tree.get("asset", {}).get("version", "2.0"))
     if not version.startswith("2."):
         raise FileFormatError(
@@ -150,6 +148,10 @@ def _read_scene(path: PathLike) -> _Scene:
         if uri is not None:
             named = uri.startswith("data:")
             buffers[uri] = base64.b64decode(uri.partition(",")[2]) if named else companion_contents(path, unquote(uri))
+    for number, (buffer, uri) in enumerate(zip(tree.get("buffers", []), uris, strict=True)):
+        length = _integer(buffer, "byteLength", len(buffers[uri]))
+        if length > len(buffers[uri]):
+            raise damaged(f"buffer {number} has {len(buffers[uri])} of {length} bytes: it may be truncated")
     return _Scene(tree, [buffers[uri] for uri in uris])
 
 
@@ -218,14 +220,14 @@ def _instances(tree: dict[str, Any]) -> Iterator[tuple[int, Floats]]:
 def _matrix(node: dict[str, Any]) -> Floats:
     """Return the (4, 4) transform from a node to its parent."""
     if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        return vector(node["matrix"], "matrix", 16).reshape(4, 4).T
     matrix = np.eye(4)
-    x, y, z, w = (float(number) for number in node.get("rotation", (0, 0, 0, 1)))
+    x, y, z, w = vector(node.get("rotation", (0, 0, 0, 1)), "rotation", 4).tolist()
     turn = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
-    matrix[:3, :3] = np.array(turn) * np.array(node.get("scale", (1, 1, 1)), dtype=np.float64)
-    matrix[:3, 3] = np.array(node.get("translation", (0, 0, 0)), dtype=np.float64)
+    matrix[:3, :3] = np.array(turn) * vector(node.get("scale", (1, 1, 1)), "scale", 3)
+    matrix[:3, 3] = vector(node.get("translation", (0, 0, 0)), "translation", 3)
     return matrix

@@ -8,7 +8,6 @@ from __future__ import annotations
 import bz2
 import gzip
 import io
-import json
 import math
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
@@ -21,7 +20,8 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..errors import FileFormatError
 from ..packages import lazy_module
-from .budgets import JSON, charge, charge_tree, charge_words
+from ..validation import numbers
+from .budgets import charge, charge_words
 from .files import (
     PathLike,
     companion_contents,
@@ -30,7 +30,7 @@ from .files import (
     format_for,
     reading,
 )
-from .numerals import integer, integers, parsed_numbers
+from .numerals import integer, integers, json_of, parsed_numbers, typed_numbers, vector
 from .numpy_files import read_npy, read_npz
 from .sandbox import parsed
 from .vtk_xml import read_vti
@@ -109,10 +109,10 @@ def _read_npy(path: PathLike) -> Image:
     if not companion.exists():
         return _aligned(values, np.zeros(values.ndim), np.ones(values.ndim))
     with reading(companion):
-        text = contents(companion)
-        charge_tree(text, JSON)
-        about = json.loads(text)
-        return _aligned(values, about["origin"], about["spacing"])
+        about = json_of(contents(companion))
+        origin = vector(about["origin"], "origin", values.ndim)
+        spacing = numbers(about["spacing"], "spacing", FileFormatError)
+        return _aligned(values, origin, spacing)
 
 
 def _read_npz(path: PathLike) -> Image:
@@ -137,7 +137,7 @@ def _read_nrrd(path: PathLike) -> Image:
         rest = companion_contents(path, companion)
     sizes = integers(header["sizes"].split(), "sizes").tolist()
     code = _CODES.get(header["type"].lower())
-    if code is None or [str(len(sizes))] != header["dimension"].split() or min(sizes, default=0) < 1:
+    if code is None or integer(header["dimension"], "dimension") != len(sizes) or min(sizes, default=0) < 1:
         raise damaged(
             f"its type '{header['type']}', dimension {header['dimension']} and sizes {sizes} do not describe an image"
         )
@@ -148,8 +148,12 @@ def _read_nrrd(path: PathLike) -> Image:
     for _ in range(lines):
         begin = rest.index(b"\n", begin) + 1
     values = _nrrd_values(rest[begin:], header, math.prod(sizes), dtype).reshape(sizes, order="F")
-    spacings = np.nan_to_num(parsed_numbers(header.get("spacings", "1 " * values.ndim).split(), "spacings"), nan=1.0)
-    steps = _nrrd_vectors(header["space directions"]) if "space directions" in header else np.diag(spacings)
+    spacings = parsed_numbers(header.get("spacings", "1 " * values.ndim).split(), "spacings")
+    steps = (
+        _nrrd_vectors(header["space directions"])
+        if "space directions" in header
+        else np.diag(np.where(np.isnan(spacings), 1.0, spacings))
+    )
     origin = _nrrd_vectors(header.get("space origin", f"({','.join('0' * values.ndim)})"))[0]
     space = header.get("space")
     return Image(values, steps.T, origin, None if space is None else SPACE_NAMES.get(space, space.lower()))
@@ -162,10 +166,10 @@ def _nrrd_header(data: bytes) -> tuple[dict[str, str], bytes]:
     fields: dict[str, str] = {}
     lines = io.BytesIO(data)
     for line in lines:
-        name, separator, value = line.decode("utf-8", errors="replace").strip().partition(": ")
+        name, separator, value = line.decode("utf-8", errors="replace").strip().partition(":")
         if not name:
             break
-        if separator and not name.startswith("#"):
+        if separator and not name.startswith("#") and not value.startswith("="):  # "name:=value" is a remark
             fields[JOINED.get(name.lower(), name.lower())] = value.strip()
     return fields, data[lines.tell() :]
 
@@ -188,7 +192,7 @@ def _nrrd_values(data: bytes, header: dict[str, str], count: int, dtype: np.dtyp
         words = data[max(skip, 0) :].split()
         if len(words) < count:
             raise _truncated(len(words), count)
-        return parsed_numbers(words[:count], "values").astype(dtype.newbyteorder("="))
+        return typed_numbers(words[:count], dtype.newbyteorder("="), "values")
     packed = encoding in ("gzip", "gz", "bzip2", "bz2")
     charge(bytes=COPIES * size + packed * (size + max(skip, 0)))
     if encoding in ("gzip", "gz"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import islice
 from typing import Any
 
@@ -27,8 +28,10 @@ KEYWORDS = frozenset(
     "scrv sp end con bevel c_interp d_interp shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
 )
 """Keywords of lines of OBJ files. Lines with other keywords are damaged if they match `NUMBER_LINE`."""
-NUMBER_LINE = re.compile(r"[-+.eE\d/ ]+")
+NUMBER_LINE = re.compile(r"[-+.eE0-9/ ]+")
 """Matches a line of numbers without its keyword."""
+CORNER = re.compile(r"[-+]?[0-9]+(/([-+]?[0-9]+)?){0,2}")
+"""Matches the ids of the vertex, the texture coordinates and the normal of a corner, of which the last two may lack."""
 ANNOUNCED_ROUNDING = 1e-4
 """Rounding error, relative to the size of a shape, above which a warning is issued."""
 _HEADER = 84  # bytes of the header of STL: 80 of comment, 4 that count the facets
@@ -213,6 +216,9 @@ def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
+        wrong = next((word for word in flat if not CORNER.fullmatch(word)), None)
+        if wrong is not None:
+            raise damaged(f"'{wrong:.40}' is no corner, such as 1, 1/2, 1//3 or 1/2/3", element=f"corner {wrong:.40}")
         flat = [word.partition("/")[0] for word in flat]
     ids = integers(flat, "vertex ids")
     if (ids == 0).any():
@@ -240,9 +246,9 @@ def read_off(path: PathLike) -> Elements:
     n_vertices, n_faces, *_ = (
         integer(word, f"number of {noun}") for word, noun in zip(rows[0], ("vertices", "faces", "edges"), strict=False)
     )
-    lines = iter(rows[1:])
+    lines, n_corners = iter(rows[1:]), cache(lambda word: integer(word, "number of corners of a face"))
     vertex_rows = list(islice(_records(lines, lambda row: 3), n_vertices))
-    face_rows = list(islice(_records(lines, lambda row: 1 + _corner_count(row[0])), n_faces))
+    face_rows = list(islice(_records(lines, lambda row: 1 + n_corners(row[0])), n_faces))
     if len(vertex_rows) < n_vertices or len(face_rows) < n_faces:
         raise damaged(
             f"{n_vertices} vertices and {n_faces} faces are announced, {len(vertex_rows)} and "
@@ -269,14 +275,6 @@ def _records(lines: Iterator[list[str]], length: Callable[[list[str]], int]) -> 
         while len(row) < n_words and (more := next(lines, None)) is not None:
             row += more
         yield row
-
-
-def _corner_count(word: str) -> int:
-    """Convert the word before the vertex ids of a face to their number; return 0 if it is not a number.
-
-    Such words are refused later.
-    """
-    return int(word) if word.isascii() and word.isdecimal() and len(word) < 19 else 0
 
 
 def write_off(shape: Elements, path: PathLike) -> bytes:

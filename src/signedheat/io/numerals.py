@@ -5,16 +5,26 @@ Python and NumPy take ``1_0`` for 10, digits of any script, and round 1.7 to a v
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError
-from ..validation import INT64_END
+from ..validation import INT64_END, numbers
+from .budgets import JSON, charge_tree
 from .files import damaged
+
+QUOTED = re.compile(rb'"[^"\n]*"')
+"""Matches a name in quotes."""
+WITH_UNDERSCORE = re.compile(rb"(?<!\S)[-+.]*[0-9][0-9.]*_")
+"""Matches the beginning of a word like a number with an underscore."""
+OF_OTHER_SCRIPT = re.compile(r"(?<!\S)[-+.0-9]*(?![0-9])\d")
+"""Matches the beginning of a word like a number with digits of other scripts."""
 
 
 def parsed_numbers(words: Sequence[Any], name: str) -> Floats:
@@ -24,6 +34,71 @@ def parsed_numbers(words: Sequence[Any], name: str) -> Floats:
         return np.array(words, dtype=np.float64)
     except (ValueError, OverflowError) as error:
         raise _no_numbers(name, "numbers", error) from error
+
+
+def json_of(content: str | bytes) -> Any:
+    """Parse JSON, after its memory has been charged to the budget of the file."""
+    charge_tree(content, JSON)
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise damaged(f"it is not JSON ({error})") from error
+
+
+def vector(values: object, name: str, count: int) -> Floats:
+    """Convert numbers of JSON to a (count,) array; refuse texts, NaN and infinity."""
+    array = numbers(values, name, FileFormatError)
+    if array.shape != (count,) or not np.isfinite(array).all():
+        raise damaged(f"{name} must be {count} finite numbers", element=name)
+    return array
+
+
+def finite_numbers(words: Sequence[str], name: str) -> Floats:
+    """Convert words of a text to real numbers; refuse NaN and infinity."""
+    array = parsed_numbers(words, name)
+    wrong = ~np.isfinite(array)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise damaged(f"number {k} of {name} is not finite, but {words[k]:.40}", element=f"number {k}")
+    return array
+
+
+def refuse_odd_text(content: bytes, name: str) -> None:
+    """Raise an error if a text has words like numbers with digits or underscores that no format allows.
+
+    This is for texts that other packages parse. Names within quotes may hold them.
+    """
+    unquoted = QUOTED.sub(b"", content) if b'"' in content else content
+    decoded = "" if unquoted.isascii() else unquoted.decode("utf-8", errors="replace")
+    odd = WITH_UNDERSCORE.search(unquoted) or OF_OTHER_SCRIPT.search(decoded)
+    if odd is not None:
+        raise damaged(f"{name} are not all numbers: one begins with {_shown(odd[0])}")
+
+
+def row_of_numbers(line: str, words: Sequence[str]) -> list[float]:
+    """Convert the words of a line to real numbers; return an empty list if one of them is none."""
+    try:
+        return [float(word) for word in words] if line.isascii() and "_" not in line else []
+    except ValueError:
+        return []
+
+
+def like_number(word: str) -> bool:
+    """Whether a word begins like a number, in digits of any script."""
+    return word.lstrip("+-.")[:1].isdigit()
+
+
+def typed_numbers(words: Sequence[str] | Sequence[bytes], dtype: DTypeLike, name: str) -> NDArray[Any]:
+    """Convert words of a text to an array of a NumPy type; refuse numbers that an integer type does not have."""
+    kind = np.dtype(dtype)
+    if kind.kind == "f":
+        return parsed_numbers(words, name).astype(kind)
+    values, limits = integers(words, name), np.iinfo(kind)
+    wrong = (values < limits.min) | (values > min(limits.max, INT64_END - 1))
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise damaged(f"number {k} of {name} is {values[k]}, which {kind.name} does not hold", element=f"number {k}")
+    return values.astype(kind)
 
 
 def integers(values: object, name: str, least: int | None = None) -> Ints:

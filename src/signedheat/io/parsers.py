@@ -132,7 +132,7 @@ def cells(path: str, module: str) -> dict[str, Any]:
     values = {name: np.asarray(column) for name, column in mesh.point_data.items()}
     values = {name: column for name, column in values.items() if column.dtype.kind in "biuf"}
     result = {"points": np.asarray(mesh.points, dtype=np.float64), "kinds": [block.type for block in mesh.cells]}
-    result |= {f"cells {k}": np.asarray(block.data, dtype=np.int64) for k, block in enumerate(mesh.cells)}
+    result |= {f"cells {k}": np.asarray(block.data) for k, block in enumerate(mesh.cells)}
     return result | {"names": list(values)} | {f"values {k}": column for k, column in enumerate(values.values())}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import math
 import re
 import struct
 from collections.abc import Sequence
@@ -18,7 +17,7 @@ from ..shapes.exchange import Elements
 from ..surfaces.point_cloud import PointCloud
 from .budgets import charge, charge_words
 from .files import PathLike, contents, damaged, extension, reading, refuse_kind, text
-from .numerals import integer, parsed_numbers
+from .numerals import integer, like_number, parsed_numbers, row_of_numbers
 from .sandbox import parsed
 
 SEPARATORS, DECIMAL_COMMAS = str.maketrans(",;", "  "), str.maketrans(",;", ". ")
@@ -27,6 +26,8 @@ WITH_COMMA = re.compile(r"[-+]?[0-9]+(,[0-9]+)?([eE][-+]?[0-9]+)?")
 """Matches a number that has a decimal comma or is whole."""
 FIELD_TYPES = {"F": "f", "I": "i", "U": "u"}
 """Letters of the types of fields in NumPy, by those in PCD files."""
+FIELD_CODES = frozenset("f4 f8 i1 i2 i4 i8 u1 u2 u4 u8".split())
+"""Types of fields, as NumPy names them without a byte order."""
 SCHEMA_INSTANCE = "http://www.w3.org/2001/XMLSchema-instance "
 """Namespace of the attributes by which XML names schemas."""
 
@@ -35,7 +36,8 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
     """Read blocks of lines, which empty lines separate, as (n, k) arrays, where k is one of `widths` and common to all.
 
     Numbers are separated by commas, semicolons, tabs or spaces. Commas are decimal where they all stand between digits
-    and something else separates the numbers. Text after ``#`` and a header line are skipped.
+    and something else separates the numbers. Text after ``#`` is skipped, and so are lines before the first point
+    unless they hold something like numbers.
     """
     blocks: list[list[list[float]]] = [[]]
     columns = 0
@@ -48,14 +50,11 @@ def read_rows(path: PathLike, widths: tuple[int, ...]) -> list[Floats]:
             if not line.strip():
                 blocks.append([])
             continue
-        try:
-            values = [float(word) for word in words] if "_" not in line and line.isascii() else []
-        except ValueError:
-            values = []
+        values = row_of_numbers(line, words)
         if values and len(values) == (columns or len(values)) and len(values) in widths:
             columns = len(values)
             blocks[-1].append(values)
-        elif values or columns:
+        elif values or columns or any(map(like_number, words[:1] if len(words) not in widths else words)):
             counts = " or ".join(map(str, [columns] if columns else widths))
             raise FileFormatError(
                 f"line {number}, '{line.strip()[:60]}', does not hold {counts} numbers",
@@ -119,14 +118,14 @@ def read_pcd(path: PathLike) -> Elements:
     while "DATA" not in header:
         end = content.find(b"\n", position)
         if end < 0:
-            raise FileFormatError("there is no line DATA: this is not a PCD file, or it is truncated")
+            raise damaged("there is no line DATA: this is not a PCD file, or it is truncated", element="DATA")
         words = content[position:end].decode("ascii", "replace").partition("#")[0].split()
         if words:
             header[words[0].upper()] = words[1:]
         position = end + 1
     table = _table(header, content[position:])
     if not {"x", "y", "z"} <= table.keys():
-        raise FileFormatError(f"the fields are {', '.join(table)}, without x, y and z")
+        raise damaged(f"the fields are {', '.join(table)}, without x, y and z", element="FIELDS")
     points = np.column_stack([table[axis] for axis in "xyz"])
     finite = np.isfinite(points).all(axis=1)
     names = [f"normal_{axis}" for axis in "xyz"]
@@ -137,21 +136,12 @@ def read_pcd(path: PathLike) -> Elements:
 
 def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
     """Return the first number of each field at the n points of a PCD file, (n,), by the name of the field."""
-    try:
-        names, kind = header["FIELDS"], header["DATA"][0].lower()
-        counts = [integer(word, "COUNT", 1) for word in header.get("COUNT", ["1"] * len(names))]
-        sizes = [header["POINTS"][0]] if "POINTS" in header else [header["WIDTH"][0], header["HEIGHT"][0]]
-        n = math.prod(integer(word, "number of points") for word in sizes)
-        types = [FIELD_TYPES[letter] + size for letter, size in zip(header["TYPE"], header["SIZE"], strict=True)]
-        fields = [(f"{k}", f"<{code}", (count,)) for k, (code, count) in enumerate(zip(types, counts, strict=True))]
-        row = np.dtype(fields)
-        if len(names) != len(fields):
-            raise ValueError
-    except (KeyError, ValueError, IndexError, TypeError):
-        raise FileFormatError("the header of the PCD file is not complete, or contradicts itself") from None
+    names, counts, types, n = _described(header)
+    row = np.dtype([(f"{k}", f"<{code}", (count,)) for k, (code, count) in enumerate(zip(types, counts, strict=True))])
+    kind = header["DATA"][0].lower() if header["DATA"] else ""
     if kind == "binary":
         if len(body) < n * row.itemsize:
-            raise FileFormatError(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
+            raise damaged(f"{n} points take {n * row.itemsize} bytes, and {len(body)} follow")
         rows = np.frombuffer(body, row, n)
         return {name: rows[f"{k}"][:, 0].astype(np.float64) for k, name in enumerate(names)}
     charge(bytes=2 * n * row.itemsize)
@@ -170,10 +160,34 @@ def _table(header: dict[str, list[str]], body: bytes) -> dict[str, Floats]:
     try:
         lines = [line.decode("ascii").split() for line in body.splitlines() if line.strip()]
         numbers = parsed_numbers(lines, "points").reshape(n, sum(counts))
-    except (ValueError, UnicodeDecodeError):
-        raise FileFormatError(f"there are no {n} lines of {sum(counts)} numbers") from None
+    except (ValueError, UnicodeDecodeError) as error:
+        cause = f" ({error.cause})" if isinstance(error, FileFormatError) else ""
+        raise damaged(f"there are no {n} lines of {sum(counts)} numbers{cause}") from None
     begins = np.concatenate([[0], np.cumsum(counts)])
     return {name: numbers[:, begins[k]] for k, name in enumerate(names)}
+
+
+def _described(header: dict[str, list[str]]) -> tuple[list[str], list[int], list[str], int]:
+    """Return the names of the fields of a PCD file, how many numbers each has, their types, and the number of points.
+
+    The types are those of NumPy, without a byte order.
+    """
+    try:
+        names, letters = header["FIELDS"], header["TYPE"]
+        sizes = [integer(word, "SIZE", 1) for word in header["SIZE"]]
+        counts = [integer(word, "COUNT", 1) for word in header.get("COUNT", ["1"] * len(names))]
+        types = [f"{FIELD_TYPES[letter]}{size}" for letter, size in zip(letters, sizes, strict=True)]
+        if not len(names) == len(types) == len(counts) or not {*types} <= FIELD_CODES:
+            raise ValueError
+        announced = {key: integer(header[key][0], key) for key in ("WIDTH", "HEIGHT", "POINTS") if key in header}
+        n = announced["POINTS"] if "POINTS" in announced else announced["WIDTH"] * announced["HEIGHT"]
+    except (KeyError, ValueError, IndexError) as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise damaged("the header of the PCD file is not complete, or contradicts itself", element="header") from None
+    if announced.get("WIDTH", n) * announced.get("HEIGHT", 1) != n and len(announced) == 3:
+        raise damaged(f"POINTS is {n}, and WIDTH times HEIGHT something else", element="POINTS")
+    return names, counts, types, n
 
 
 def read_las(path: PathLike) -> PointCloud:

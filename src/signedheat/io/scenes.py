@@ -21,7 +21,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from . import gltf
 from .budgets import BYTES_PER_PLACED, XML, charge, charge_tree
 from .files import PathLike, contents, damaged, extension, reading
-from .numerals import integers, parsed_numbers
+from .numerals import finite_numbers, integer, integers, parsed_numbers
 from .sandbox import parsed
 
 METRES = {
@@ -45,6 +45,10 @@ MOST_COMPONENT_DEPTH = 32
 
 Key = tuple[str, str]
 """The name of a part, which is a file in a 3MF package, and the id of an object in it."""
+COLLADA_IDS = {"p": 0, "ph": 0, "h": 0, "vcount": 0, "v": -1}
+"""Elements of COLLADA files that hold ids or counts, and the least number that each may hold."""
+COLLADA_REALS = ("float_array", "matrix", "translate", "rotate", "scale", "lookat", "skew")
+"""Elements of COLLADA files that hold real numbers."""
 FACET_DEFLECTION = 1e-3
 """Default of the largest distance of triangles from the CAD surface, relative to the diagonal of the box around it."""
 FACET_ANGLE = 0.3
@@ -66,8 +70,32 @@ def read_glb(path: PathLike) -> TriangleMesh:
 def read_dae(path: PathLike) -> TriangleMesh:
     """Read all triangles of a COLLADA scene, transformed by their nodes, in the units of the file and with its axes."""
     ensure_installed("collada", ".dae files")
+    with reading(path):
+        _refuse_wrong_numbers(contents(path))
     parts = parsed("dae", path, "trimesh", ".dae files")
     return _joined([(parts["points"], parts["triangles"])] if len(parts["triangles"]) else [])
+
+
+def _refuse_wrong_numbers(data: bytes) -> None:
+    """Raise `FileFormatError` if ids, counts or coordinates in a COLLADA file are no numbers of their kind.
+
+    Its parser takes −1 for the last vertex, 2³² + 1 for the second, and NaN for 0.
+    """
+    charge_tree(data, XML)
+    try:
+        root = ElementTree.fromstring(data)
+    except (ElementTree.ParseError, ValueError):  # the parser reports it, or knows the encoding
+        return
+    for element in root.iter():
+        kind, words = str(element.tag).rpartition("}")[2], (element.text or "").split()
+        if kind in COLLADA_IDS:
+            if integers(words, f"<{kind}>", COLLADA_IDS[kind]).max(initial=0) > len(data):
+                raise damaged(f"<{kind}> has an id that is larger than the file", element=kind)
+        elif kind in COLLADA_REALS:
+            finite_numbers(words, f"<{kind}>")
+        for name in ("count", "offset", "stride"):
+            if name in element.attrib:
+                integer(element.attrib[name], f"{name} of <{kind}>")
 
 
 @dataclass
@@ -120,8 +148,8 @@ def _collada_unit(data: bytes) -> str | None:
     for _, element in ElementTree.iterparse(io.BytesIO(data)):
         if element.tag.endswith("}unit"):
             try:
-                metres = float(element.get("meter", 1))
-            except ValueError:  # nothing else needs it
+                [metres] = parsed_numbers([element.get("meter", "1")], "meter").tolist()
+            except FileFormatError:  # nothing else needs it
                 return None
             return next((unit for unit, length in METRES.items() if math.isclose(metres, length, rel_tol=1e-4)), None)
         if element.tag.endswith("}asset"):

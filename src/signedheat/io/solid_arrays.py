@@ -16,6 +16,7 @@ from ..solids.winding import Windings
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import refuse_extreme
 from .files import PathLike, reading
+from .numerals import integers
 from .numpy_files import names_in_npz, read_npz
 
 SOLID_ARRAYS = ("triangles", "origins", "confidence", "bounding", "closing", "key")
@@ -110,17 +111,15 @@ def read_solid(path: PathLike) -> Solid:
     >>> bool(again.distance([[0.1, 0.2, 0.3]]) == solid.distance([[0.1, 0.2, 0.3]]))
     True
     """
-    version = read_npz(path, ("solid_version",)).get("solid_version", np.zeros(1))
-    if version.shape or version.dtype.kind not in "iuf" or not 0 < version < np.inf:
-        raise FileFormatError("it has no solid", remedy="read fields by `read_field`, shapes by `read`", path=path)
-    if int(version) != ARCHIVE_VERSION:
-        remedy = (
-            "install a later version of signedheat" if int(version) > ARCHIVE_VERSION else "complete the shape again"
-        )
-        raise FileFormatError(
-            f"another version wrote it ({int(version)}, not {ARCHIVE_VERSION})", remedy=remedy, path=path
-        )
     with reading(path):
+        held = read_npz(path, ("solid_version",)).get("solid_version")
+        if held is None or held.shape:
+            raise FileFormatError("it has no solid", remedy="read fields by `read_field`, shapes by `read`")
+        [version] = integers(held.reshape(1), "solid_version", 1).tolist()
+        if version != ARCHIVE_VERSION:
+            is_later = version > ARCHIVE_VERSION
+            remedy = "install a later version of signedheat" if is_later else "complete the shape again"
+            raise FileFormatError(f"another version wrote it ({version}, not {ARCHIVE_VERSION})", remedy=remedy)
         return solid_of(read_npz(path, SOURCE_ARRAYS, SOLID_ARRAYS))
 
 

@@ -9,6 +9,7 @@ import re
 import shutil
 import tempfile
 import warnings
+from collections.abc import Iterator
 from contextlib import redirect_stderr
 from io import StringIO
 from pathlib import Path
@@ -22,8 +23,8 @@ from ..shapes.exchange import FLAT_CELLS, VALUES_NAME
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from .files import PathLike, contents, damaged, extension, format_for, replacing, writing
-from .numerals import integers
+from .files import PathLike, contents, damaged, extension, format_for, reading, replacing, writing
+from .numerals import integers, refuse_odd_text
 from .sandbox import parsed
 from .vtk_xml import Block, Cells, read_vtu
 
@@ -66,10 +67,10 @@ def load_cells(path: PathLike) -> Any:
     for file in _files(path):
         if all(line.startswith(b"#") for line in contents(file).split(b"\n") if line.strip()):  # meshio would never end
             raise FileFormatError("the file is empty", remedy="write it again", path=file)
-    if extension(path) == ".msh":
-        _refuse_announcements(path)
+        with reading(file):
+            _refuse_wrong_numbers(file)
     parts = parsed("cells", path, "meshio", "tet meshes", module=MESHIO_MODULES[extension(path)])
-    blocks = [Block(kind, parts[f"cells {k}"]) for k, kind in enumerate(parts["kinds"])]
+    blocks = [Block(kind, integers(parts[f"cells {k}"], f"ids of {kind}")) for k, kind in enumerate(parts["kinds"])]
     values = {name: parts[f"values {k}"] for k, name in enumerate(parts["names"])}
     return Cells(parts["points"], blocks, values)
 
@@ -92,20 +93,63 @@ def _files(path: PathLike) -> list[Path]:
     return [*(named.with_suffix(end) for end in TETGEN if extension(path) in TETGEN and end != extension(path)), named]
 
 
-def _refuse_announcements(path: PathLike) -> None:
-    """Raise `FileFormatError` if a Gmsh file announces more items than it has bytes, which would stall meshio."""
-    data = contents(path)
-    begin = data.find(b"$MeshFormat")
-    version, form, size = (*data[max(begin, 0) : begin + LONGEST_LINE].split()[1:4], b"", b"", b"")[:3]
-    if begin < 0 or form not in (b"0", b"1") or size not in (b"4", b"8"):
+def _refuse_wrong_numbers(path: PathLike) -> None:
+    """Raise `FileFormatError` if counts in a file are negative, or larger than the file, which would stall meshio.
+
+    In text, numbers that only Python reads are refused, too, such as 1_0.
+    """
+    data, ending = contents(path), extension(path)
+    version, form, size = _gmsh_format(data) if ending == ".msh" else (b"", b"", b"")
+    if ending == ".msh" and form not in (b"0", b"1"):
         return  # meshio reports it
-    is_raw, kind = form == b"1" and version.startswith(b"4"), np.dtype(f"<u{size.decode()}")
-    for section in re.finditer(rb"^\$(\w+)[ \t]*\r?\n", data, re.MULTILINE):
-        name, begin = section[1].decode(), section.end()
-        if is_raw and name in COUNTED and name not in IN_TEXT:
-            counts = np.frombuffer(data, kind, COUNTED[name], begin).tolist()
-        else:
-            words = data[begin : begin + LONGEST_LINE].split(b"\n")[0].split()[: COUNTED.get(name, 0)]
-            counts = integers(words, f"counts of {name}").tolist()
+    if ending == ".msh" and size not in (b"4", b"8"):
+        raise damaged("the size of its numbers is neither 4 nor 8 bytes", element="MeshFormat")
+    is_text = b"BINARY" not in data.split(b"\n", 3)[2:3] if ending == ".vtk" else ending != ".meshb" and form != b"1"
+    if is_text:
+        refuse_odd_text(data, "words")
+    if ending == ".msh":
+        announced = _gmsh_counts(
+            data, None if is_text or not version.startswith(b"4") else np.dtype(f"<u{size.decode()}")
+        )
+    else:
+        announced = _tetgen_counts(data) if ending in TETGEN else _vtk_counts(data) if ending == ".vtk" else iter(())
+    for name, counts in announced:
         if max(counts, default=0) > len(data):
             raise damaged(f"it has {len(data)} bytes, and announces {max(counts)} {name}", element=name)
+    if is_text and version.startswith(b"2"):
+        nodes = data.partition(b"$Nodes")[2].partition(b"$EndNodes")[0].split()[1:]
+        integers(nodes[::4], "numbers of nodes", 0)
+
+
+def _gmsh_format(data: bytes) -> tuple[bytes, bytes, bytes]:
+    """Return the version of a Gmsh file, ``b"1"`` if it is binary, and the size of its counts in bytes, as words."""
+    begin = data.find(b"$MeshFormat")
+    version, form, size = (*data[max(begin, 0) : begin + LONGEST_LINE].split()[1:4], b"", b"", b"")[:3]
+    return (version, form, size) if begin >= 0 else (b"", b"", b"")
+
+
+def _gmsh_counts(data: bytes, kind: np.dtype[Any] | None) -> Iterator[tuple[str, list[int]]]:
+    """Yield the name of each section of a Gmsh file with the counts at its beginning, binary ones of a type or text."""
+    for section in re.finditer(rb"^\$(\w+)[ \t]*\r?\n", data, re.MULTILINE):
+        name, begin = section[1].decode(), section.end()
+        if kind is not None and name in COUNTED and name not in IN_TEXT:
+            yield name, np.frombuffer(data, kind, COUNTED[name], begin).tolist()
+        else:
+            words = data[begin : begin + LONGEST_LINE].split(b"\n")[0].split()[: COUNTED.get(name, 0)]
+            yield name, integers(words, f"counts of {name}", 0).tolist()
+
+
+def _vtk_counts(data: bytes) -> Iterator[tuple[str, list[int]]]:
+    """Yield the name of each section of a file of VTK's older format with the counts after it."""
+    for section in re.finditer(rb"^(POINTS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA)[ \t]([^\r\n]*)", data, re.MULTILINE):
+        name = section[1].decode()
+        words = section[2][:LONGEST_LINE].split()[: 2 if name == "CELLS" else 1]
+        yield name, integers(words, f"counts of {name}", 0).tolist()
+
+
+def _tetgen_counts(data: bytes) -> Iterator[tuple[str, list[int]]]:
+    """Yield the counts on the first line of a TetGen file that is no comment."""
+    for line in data.split(b"\n"):
+        if words := line.partition(b"#")[0].split():
+            yield "items", integers(words, "counts of the first line", 0).tolist()
+            return

@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
+
 from ..errors import FileFormatError
 from .budgets import XML, charge_tree
 from .files import PathLike, contents, reading
@@ -33,10 +35,10 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
         for mesh in root.iter("mesh"):
             name = mesh.get("filename", "")
             scale = parsed_numbers(mesh.get("scale", "1 1 1").split(), "a scale")
-            if not name or "\0" in name or len(scale) != 3 or not (scale != 0).all():
+            if not name or "\0" in name or len(scale) != 3 or not (np.isfinite(scale) & (scale != 0)).all():
                 raise FileFormatError(
                     f"a mesh has the name {name!r:.80} and the scale {mesh.get('scale')!r:.40}",
-                    remedy="give a name, and three numbers that are not 0",
+                    remedy="give a name, and three finite numbers that are not 0",
                 )
             x, y, z = map(float, scale)
             meshes[_path_of_mesh(Path(path), name), (x, y, z)] = None

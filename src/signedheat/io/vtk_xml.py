@@ -24,7 +24,7 @@ from ..errors import FileFormatError
 from ..shapes.exchange import Elements
 from .budgets import BYTES_PER_PLACED, XML, charge, charge_tree, charge_words
 from .files import PathLike, contents, damaged
-from .numerals import integer, integers, parsed_numbers
+from .numerals import integer, integers, parsed_numbers, typed_numbers
 
 VTK_TYPES = {f"{kind}{8 * size}": f"{kind[0].lower()}{size}" for kind in ("Int", "UInt") for size in (1, 2, 4, 8)}
 VTK_TYPES |= {"Float32": "f4", "Float64": "f8"}
@@ -44,6 +44,8 @@ CELL_NAMES = {
     24: "tetra10",
 }
 """Names of the kinds of cells in meshio, by their numbers in VTK."""
+CELL_GROUPS = ("Verts", "Polys", "Lines", "Strips")
+"""Names of the groups of cells of polygonal data."""
 
 
 def write_vti(origin: Floats, spacing: Floats, values: Mapping[str, NDArray[Any]], convention: str) -> bytes:
@@ -109,7 +111,7 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
         raise FileFormatError(f"the axes of the image are rotated ({direction})", remedy="resample it along x, y, z")
     shape = extent[1::2] - extent[::2] + 1
     n_nodes = math.prod(shape.tolist())
-    if shape.min() < 1 or abs(extent).max() >= 2**53:
+    if shape.min() < 1 or extent.max() >= 2**53 or extent.min() <= -(2**53):
         raise damaged(f"its extent is {' '.join(map(str, extent.tolist()))}: it is damaged")
     dimension = 3 if shape[2] > 1 else 2 if shape[1] > 1 else 1
     spacing = parsed_numbers(image.get("Spacing", "1 1 1").split(), "spacing")
@@ -123,11 +125,10 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
     images = []
     first = next((array for array in listed if array.get("Name") == nodes.get("Scalars")), listed[0])
     for element in [first, *(array for array in listed if array is not first and array.get("Name") == other)][:2]:
-        if element.get("NumberOfComponents", "1") not in ("1", ""):
-            raise FileFormatError(
-                f"'{element.get('Name')}' has {element.get('NumberOfComponents')} numbers at each node",
-                remedy="save a scalar",
-            )
+        n_components = arrays.n_components(element)
+        if n_components > 1:
+            cause = f"'{element.get('Name')}' has {n_components} numbers at each node"
+            raise FileFormatError(cause, remedy="save a scalar")
         images.append(arrays.of(element, n_nodes).reshape(shape[:dimension], order="F"))
     return images[0], origin[:dimension], spacing[:dimension], images[1] if len(images) > 1 else None
 
@@ -146,7 +147,7 @@ def write_vtp(shape: Elements, path: PathLike) -> bytes:
     xyz = f"<Points>{writer.array('Points', points)}</Points>"
     ends = np.cumsum(counts)
     cells = f"<{group}>{writer.array('connectivity', corners)}{writer.array('offsets', ends)}</{group}>"
-    sizes = {"Verts": 0, "Polys": 0, "Lines": 0, "Strips": 0, group: len(counts)}
+    sizes = dict.fromkeys(CELL_GROUPS, 0) | {group: len(counts)}
     numbered = " ".join(f'NumberOf{name}="{number}"' for name, number in sizes.items())
     piece = f'<Piece NumberOfPoints="{len(points)}" {numbered}>{data}{xyz}{cells}</Piece>'
     return writer.file("PolyData", f"<PolyData>{piece}</PolyData>")
@@ -159,15 +160,16 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     """
     root, arrays = parse(path, "PolyData")
     pieces = root.findall("PolyData/Piece")
-    made = sum(arrays.count(piece, name) for piece in pieces for name in ("NumberOfPoints", "NumberOfPolys"))
+    counted = [{name: arrays.count(piece, f"NumberOf{name}") for name in ("Points", *CELL_GROUPS)} for piece in pieces]
+    made = sum(numbers["Points"] + numbers["Polys"] for numbers in counted)
     charge(BYTES_PER_PLACED * made, len(pieces), made)
     points, corners, counts, n_points = [], [], [], 0
     found: dict[str, list[NDArray[Any]]] = {name: [] for name in ("Normals", "area", *names)}
-    for piece in pieces:
+    for piece, numbers in zip(pieces, counted, strict=True):
         table = {(group.tag, element.get("Name")): element for group in piece for element in group.iter("DataArray")}
-        if arrays.count(piece, "NumberOfStrips"):
+        if numbers["Strips"]:
             raise FileFormatError("there are triangle strips", remedy="convert them to triangles before saving")
-        n_own, n_faces = arrays.count(piece, "NumberOfPoints"), arrays.count(piece, "NumberOfPolys")
+        n_own, n_faces = numbers["Points"], numbers["Polys"]
         xyz = next((element for (tag, _), element in table.items() if tag == "Points"), None)
         offsets = integers(arrays.of(table.get(("Polys", "offsets")), n_faces), "offsets", 0)
         if n_faces == 0 and piece.get("NumberOfPolys") is None and piece.find("Polys/DataArray") is not None:
@@ -193,7 +195,7 @@ def read_vtp(path: PathLike, names: Sequence[str] = ()) -> Elements:
     faces = np.concatenate(corners), np.concatenate(counts)
     if len(faces[1]):
         return Elements(np.concatenate(points), *faces, values=values)
-    if any(arrays.count(piece, "NumberOfLines") for piece in pieces):
+    if any(numbers["Lines"] for numbers in counted):
         raise FileFormatError("there are lines and no faces", remedy="save the points alone, or a surface")
     normals = columns["Normals"].reshape(-1, 3) if "Normals" in columns else None
     return Elements(np.concatenate(points), normals=normals, areas=columns.get("area"), values=values)
@@ -306,10 +308,15 @@ class _Arrays:
         """Return a number such as ``NumberOfPoints`` that a part of the file announces, 0 by default."""
         return integer(piece.get(name, "0").strip(), name)
 
+    def n_components(self, element: ElementTree.Element) -> int:
+        """Return how many numbers each point or cell has in a DataArray element, 1 by default."""
+        return integer(element.get("NumberOfComponents", "").strip() or "1", "NumberOfComponents", 1)
+
     def of(self, element: ElementTree.Element | None, count: int) -> NDArray[Any]:
         """Return the (count,) numbers of a DataArray element, and raise an error if there are more or fewer."""
         if element is None:
             return self._counted(np.empty(0), count)
+        self.n_components(element)  # raises an error if it is no number
         code = VTK_TYPES.get(element.get("type", ""))
         if code is None:
             raise FileFormatError(f"arrays of type '{element.get('type')}' are not supported", remedy="use Float64")
@@ -317,10 +324,7 @@ class _Arrays:
         charge_words(element.text or "")
         inline = (element.text or "").split()
         if form == "ascii":
-            values = parsed_numbers(inline, "values") if code[0] == "f" else integers(inline, "values")
-            if code[0] != "f" and values.size and not (values == values.astype(code)).all():
-                raise damaged(f"values do not fit into {element.get('type')}")
-            return self._counted(values.astype(code), count)
+            return self._counted(typed_numbers(inline, code, "values"), count)
         size = count * np.dtype(code).itemsize
         charge(bytes=(1 if self.compressor is None else 3) * size)  # compressed blocks, joined
         try:
@@ -405,7 +409,9 @@ def parse(path: PathLike, kind: str) -> tuple[ElementTree.Element, _Arrays]:
         raise damaged(f"it is not XML ({error}): the file is truncated or damaged") from error
     if root.tag != "VTKFile" or root.get("type") != kind:
         raise FileFormatError(f"it holds {root.get('type', root.tag)}, not {kind}", remedy="check the extension")
-    order = "<" if root.get("byte_order", "LittleEndian") == "LittleEndian" else ">"
+    order = {"LittleEndian": "<", "BigEndian": ">"}.get(root.get("byte_order", "LittleEndian"))
+    if order is None:
+        raise damaged(f"its byte_order '{root.get('byte_order')}' is unknown: it is damaged")
     width = {"UInt32": "u4", "UInt64": "u8"}.get(root.get("header_type", "UInt32"))
     if width is None:
         raise damaged(f"its header_type '{root.get('header_type')}' is unknown: it is damaged")

@@ -6,11 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import reduce
 from typing import Any, Protocol, cast
 
-import numpy as np
-
 from ..errors import GeometryError, UnsupportedTypeError
 from ..grids.polyline import Polyline
 from ..packages import lazy_module
+from ..validation import numbers
 
 shapely: Any = lazy_module("shapely", "geometries of shapely")
 
@@ -75,11 +74,12 @@ def _lines(geometry: Mapping[str, Any]) -> Iterator[Polyline]:
 def _polyline(points: Any, closed: bool) -> Polyline:
     """Return the polyline through points of GeoJSON; it is closed if `closed`, or if it ends at its first point."""
     try:
-        positions = np.array([[float(x) for x in point[:2]] for point in points], dtype=np.float64)
-    except (TypeError, ValueError, LookupError) as error:
+        pairs = [[point[0], point[1]] for point in points]
+    except (TypeError, LookupError) as error:
         raise GeometryError(
             f"coordinates of a geometry must be pairs of numbers ({error})", element="coordinates"
         ) from error
+    positions = numbers(pairs, "coordinates")
     return Polyline(positions, closed or (len(positions) > 2 and bool((positions[0] == positions[-1]).all())))
 
 
