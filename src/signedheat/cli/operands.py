@@ -24,6 +24,7 @@ from ..io.field_files import VALUE_FORMATS, save_with_values
 from ..io.files import contents, distinct_names, extension
 from ..io.image_files import CONFIDENCE, NIFTI
 from ..io.key_figures import describe as describe
+from ..io.numerals import parsed_numbers
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
 from ..memory import refuse_beyond_memory
@@ -143,17 +144,19 @@ def unit_scale(arguments: Namespace, path: str) -> float:
 
 def matrix_of(words: list[str]) -> Floats:
     """Return the (4, 4) matrix of 16 or 12 numbers, row by row, given as words or in a text file named by one word."""
-    if len(words) == 1:
-        words = contents(words[0])[:10_000].decode("utf-8", "replace").replace(",", " ").split()
+    path = words[0] if len(words) == 1 else None
+    if path is not None:
+        words = contents(path)[:10_000].decode("utf-8", "replace").replace(",", " ").split()
     try:
-        numbers = np.array([float(word) for word in words])
-    except ValueError:
+        numbers = parsed_numbers(words, "numbers")
+    except FileFormatError:
         numbers = np.zeros(0)
     if len(numbers) not in (12, 16) or not np.isfinite(numbers).all():
         raise SourceError(
             "a transform has 16 numbers, or 12 without the last row",
             element="--transform",
             remedy="give them row by row",
+            path=path,
         )
     matrix = np.eye(4)
     matrix[: len(numbers) // 4] = numbers.reshape(-1, 4)

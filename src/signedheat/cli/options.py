@@ -195,7 +195,7 @@ def without_exponents(words: Iterable[str]) -> list[str]:
     >>> without_exponents(["offset", "-1e-3", "-2.5e1", "--quiet"])
     ['offset', '-0.001', '-25.0', '--quiet']
     """
-    is_number = re.compile(r"-(\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?", re.IGNORECASE).fullmatch
+    is_number = re.compile(r"-([0-9]+(\.[0-9]*)?|\.[0-9]+)(e[-+]?[0-9]+)?", re.IGNORECASE).fullmatch
     return [format(Decimal(repr(float(word))), "f") if is_number(word) else word for word in words]
 
 
@@ -256,7 +256,7 @@ def is_quiet(arguments: Namespace) -> bool:
 def finite(word: str) -> float:
     """Parse a finite number, for argparse."""
     try:
-        value = float(word)
+        value = float(word) if word.isascii() and "_" not in word else math.nan  # Python reads 1_0, and other scripts
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
@@ -293,7 +293,7 @@ def whole_number(least: int, most: int | None = None) -> Callable[[str], int]:
     upper = "on" if most is None else f"to {most}"
 
     def parse(word: str) -> int:
-        is_number = re.fullmatch(r"[-+]?\d{1,4000}", word)
+        is_number = re.fullmatch("[-+]?[0-9]{1,4000}", word)
         if not is_number or int(word) < least or (most is not None and int(word) > most):
             raise argparse.ArgumentTypeError(f"'{word}' is not a whole number from {least} {upper}")
         return int(word)
