@@ -15,6 +15,7 @@ import pytest
 import signedheat as sh
 from signedheat import compiled
 from signedheat.compiled import Kernel
+from signedheat.parallel import n_threads
 
 SCALING = """
 from signedheat.compiled import compiled
@@ -237,13 +238,15 @@ def test_full_disk(cache, tmp_path, shifted):
     subprocess.run(child, cwd=tmp_path, env=environment, check=True, stderr=subprocess.PIPE)
 
 
-@pytest.mark.parametrize("threads", ["0", "-1", "many", "1000000"])
+@pytest.mark.parametrize("threads", ["0", "-1", "many", "1000000", "１", "²", "1_0", "9" * 5000])
 def test_numbers_of_threads_that_are_none(monkeypatch, threads, cache, shifted):
     compiled._prepare.cache_clear()
     monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
     with pytest.raises(sh.errors.SignedHeatError) as caught:
         shifted()
     assert caught.value.element == "NUMBA_NUM_THREADS" and caught.value.remedy
+    with pytest.raises(sh.errors.SignedHeatError):
+        n_threads()
 
 
 def test_compiling_is_logged_once(cache, shifted, caplog, capfd, monkeypatch):

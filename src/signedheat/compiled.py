@@ -29,8 +29,7 @@ from typing import Any, Generic, ParamSpec, TypeVar, overload
 
 import numpy as np
 
-from .errors import SignedHeatError
-from .jobs import MOST_THREADS, Announcement, interruptible, stop_if_abandoned
+from .jobs import Announcement, interruptible, stop_if_abandoned, wanted_threads
 from .packages import lazy_module
 
 numba: Any = lazy_module("numba", "compiled kernels")
@@ -386,13 +385,7 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
 @cache
 def _prepare() -> None:
     """Register kernels as a type of Numba, so that compiled code can call them, and check ``NUMBA_NUM_THREADS``."""
-    threads = os.environ.get("NUMBA_NUM_THREADS")
-    if threads is not None and not (threads.isdecimal() and 0 < int(threads) <= MOST_THREADS):
-        raise SignedHeatError(
-            f"the environment variable NUMBA_NUM_THREADS is {threads!r}, which is no number of threads",
-            remedy="unset it, or set it to 1 or more",
-            element="NUMBA_NUM_THREADS",
-        )
+    wanted_threads()
 
     class Part(numba.types.Dispatcher):  # type: ignore[misc]
         """Numba's type of a kernel. It is compiled for types of arguments only, not for each literal constant."""

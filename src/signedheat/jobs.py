@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import re
 import sys
 import threading
 import time
@@ -17,6 +18,8 @@ from functools import partial
 from threading import Thread
 from typing import Any, TypeVar
 
+from .errors import SignedHeatError
+
 Result = TypeVar("Result")
 
 logger: logging.Logger = logging.getLogger("signedheat")
@@ -28,6 +31,20 @@ CLEAR_LINE = "\r\x1b[2K"
 
 Progress = Callable[[float, str], None]
 """A function that is called with the fraction done, from 0 to 1, and the name of the step that begins."""
+
+
+def wanted_threads() -> int | None:
+    """Return the number of threads in the environment variable ``NUMBA_NUM_THREADS``, or None if it is not set."""
+    word = os.environ.get("NUMBA_NUM_THREADS")
+    if word is None:
+        return None
+    if not re.fullmatch("[0-9]{1,9}", word) or not 0 < int(word) <= MOST_THREADS:
+        raise SignedHeatError(
+            f"the environment variable NUMBA_NUM_THREADS is {word!r}, which is no number of threads",
+            remedy=f"unset it, or set it to a number from 1 to {MOST_THREADS}",
+            element="NUMBA_NUM_THREADS",
+        )
+    return int(word)
 
 
 class Announcement:

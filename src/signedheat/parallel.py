@@ -18,7 +18,17 @@ from numpy.typing import NDArray
 
 from .arrays import Floats
 from .errors import SignedHeatError
-from .jobs import awaited, briefly, interruptible, own_flag, run_limited, settle, start_thread, stop_if_abandoned
+from .jobs import (
+    awaited,
+    briefly,
+    interruptible,
+    own_flag,
+    run_limited,
+    settle,
+    start_thread,
+    stop_if_abandoned,
+    wanted_threads,
+)
 from .packages import lazy_module
 
 distributed: Any = lazy_module("distributed", "Dask clusters")
@@ -37,8 +47,7 @@ CLUSTER_SECONDS = 30.0
 def n_threads() -> int:
     """Return the number of processors available to this process, or ``NUMBA_NUM_THREADS`` if that is less."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else (os.cpu_count() or 1)
-    wanted = os.environ.get("NUMBA_NUM_THREADS", "")
-    return min(available, int(wanted)) if wanted.isdigit() and int(wanted) > 0 else available
+    return min(available, wanted_threads() or available)
 
 
 def in_chunks(
