@@ -391,6 +391,15 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
 
 
 @compiled
+def _product(points: Floats, a: int, b: int, c: int, d: int) -> float:
+    """Return the scalar product of the ways from point a to b and from c to d."""
+    product = 0.0
+    for k in range(3):
+        product += (points[b, k] - points[a, k]) * (points[d, k] - points[c, k])
+    return product
+
+
+@compiled
 def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
     """Return whether point v lies between the ends of edge ab, and at most `slack` from it."""
     square, ahead = 0.0, 0.0
@@ -412,13 +421,14 @@ def _closest(points: Floats, a: int, b: int, c: int, d: int, middle: Floats) -> 
 
     The distance is infinite if the edges are parallel, or nearest to each other at an end.
     """
-    u, v, w = points[b] - points[a], points[d] - points[c], points[c] - points[a]
-    n, square, s, t = np.empty(3), 0.0, 0.0, 0.0
+    u, v, w, n, square, s, t = np.empty(3), np.empty(3), np.empty(3), np.empty(3), 0.0, 0.0, 0.0
+    for k in range(3):
+        u[k], v[k], w[k] = points[b, k] - points[a, k], points[d, k] - points[c, k], points[c, k] - points[a, k]
     for k in range(3):
         p, q = (k + 1) % 3, (k + 2) % 3
         n[k] = u[p] * v[q] - u[q] * v[p]
         square += n[k] * n[k]
-    if not square > PARALLEL_EDGES**2 * (u * u).sum() * (v * v).sum():
+    if not square > PARALLEL_EDGES**2 * _product(points, a, b, a, b) * _product(points, c, d, c, d):
         return np.inf
     for k in range(3):
         p, q = (k + 1) % 3, (k + 2) % 3
@@ -437,8 +447,10 @@ def _closest(points: Floats, a: int, b: int, c: int, d: int, middle: Floats) -> 
 @compiled
 def _normal(points: Floats, face: Ints) -> tuple[float, float, float]:
     """Return the unit normal of a face, (3,) vertex ids."""
-    u, v = points[face[1]] - points[face[0]], points[face[2]] - points[face[0]]
-    x, y, z = u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]
+    a, b, c = face[0], face[1], face[2]
+    ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
+    vx, vy, vz = points[c, 0] - points[a, 0], points[c, 1] - points[a, 1], points[c, 2] - points[a, 2]
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     length = np.sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
 
@@ -556,9 +568,31 @@ def _is_along(chains: Chains, line: int, p: int) -> bool:
     """Return whether point p is an end of a line or one of the points on it."""
     if p == chains.ends[line, 0] or p == chains.ends[line, 1]:
         return True
-    on_line = chains.points[chains.starts[line] : chains.starts[line + 1]]
-    index = np.searchsorted(on_line, p)
-    return bool(index < len(on_line) and on_line[index] == p)
+    low, end = chains.starts[line], chains.starts[line + 1]
+    high = end
+    while low < high:
+        middle = (low + high) // 2
+        if chains.points[middle] < p:
+            low = middle + 1
+        else:
+            high = middle
+    return bool(low < end and chains.points[low] == p)
+
+
+@compiled
+def _sort(ids: list[int], keys: Floats) -> None:
+    """Sort ids in place by their keys, and the keys with them (Shell 1959); compiling NumPy's sort takes a second."""
+    gap = 1
+    while 3 * gap < len(ids):
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, len(ids)):
+            item, key, k = ids[i], keys[i], i
+            while k >= gap and keys[k - gap] > key:
+                ids[k], keys[k] = ids[k - gap], keys[k - gap]
+                k -= gap
+            ids[k], keys[k] = item, key
+        gap //= 3
 
 
 @compiled
@@ -594,22 +628,23 @@ def _segments(
         for _ in range(2):
             most = -1.0
             for c in common:
-                square = ((points[c] - points[p]) ** 2).sum()
+                square = _product(points, p, c, p, c)
                 if square > most:
                     q, most = c, square
             p, q = q, p
         p, q = q, p
-        way = points[q] - points[p]
-        square, widest = (way * way).sum(), 0.0
+        square, widest = _product(points, p, q, p, q), 0.0
         shares = np.empty(len(common))
         for c in range(len(common)):
-            away = points[common[c]] - points[p]
-            shares[c] = (away * way).sum() / square
-            widest = max(widest, np.sqrt(((away - shares[c] * way) ** 2).sum()))
+            shares[c], off = _product(points, p, common[c], p, q) / square, 0.0
+            for d in range(3):
+                way = points[q, d] - points[p, d]
+                off += (points[common[c], d] - points[p, d] - shares[c] * way) ** 2
+            widest = max(widest, np.sqrt(off))
         if widest <= min(straight[f], straight[g]):
-            order = np.argsort(shares)
-            for c in range(len(order) - 1):
-                a, b = common[order[c]], common[order[c + 1]]
+            _sort(common, shares)
+            for c in range(len(common) - 1):
+                a, b = common[c], common[c + 1]
                 e = _shared_edge(face_edges, chains, f, a, b)
                 h = _shared_edge(face_edges, chains, g, a, b)
                 if e < 0 and h < 0:
@@ -632,11 +667,9 @@ def _segments(
                         if first < 0:
                             first = last = c
                             continue
-                        way = points[ends[e, 1]] - points[ends[e, 0]]
-                        ahead = ((points[c] - points[first]) * way).sum()
-                        if ahead < 0.0:
+                        if _product(points, first, c, ends[e, 0], ends[e, 1]) < 0.0:
                             first = c
-                        elif ((points[c] - points[last]) * way).sum() > 0.0:
+                        elif _product(points, last, c, ends[e, 0], ends[e, 1]) > 0.0:
                             last = c
                 if first == last or _shared_edge(face_edges, chains, outer, first, last) >= 0:
                     continue

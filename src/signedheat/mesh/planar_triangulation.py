@@ -62,7 +62,7 @@ def triangulate_faces(
     for f in range(m):
         begin, n, rim = starts[f], starts[f + 1] - starts[f], corners[f, 2]
         x = _flattened(points, members[begin : begin + n], corners[f])
-        size = max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
+        size = _size(x)
         mesh = _rim(x, corners[f], FLAT_HEIGHT * size, FLAT_HEIGHT * size)
         for i in range(rim, n):
             _insert(mesh, i)
@@ -95,7 +95,7 @@ def triangulate_crossing(
 
     If rounding prevents a segment, its points end before its second end.
     """
-    n, size = len(x), max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
+    n, size = len(x), _size(x)
     mesh = _rim(x, corners, FLAT_HEIGHT * size, near)
     for i in range(corners[2], n):
         _insert(mesh, i)
@@ -125,8 +125,7 @@ def triangulate_crossing(
             a = goal
         starts[s + 1] = len(ways)
     total, last = mesh.room
-    across = np.where(mesh.fixed, -1, mesh.adj)
-    return mesh.x[:total], mesh.parents[n:total], mesh.tri[:last], across[:last], np.array(ways), starts
+    return mesh.x[:total], mesh.parents[n:total], mesh.tri[:last], _across(mesh), np.array(ways), starts
 
 
 @compiled
@@ -136,7 +135,7 @@ def _triangulate_apart(x: Floats, corners: Ints, segments: Ints) -> tuple[Ints, 
     Returns (k, 3) constrained Delaunay triangles, and (k, 3) the triangle across each edge; empty arrays if a segment
     crosses another or passes through a point.
     """
-    none, size = np.empty((0, 3), np.int64), max(np.ptp(x[:, 0]), np.ptp(x[:, 1]))
+    none, size = np.empty((0, 3), np.int64), _size(x)
     mesh = _rim(x, corners, FLAT_HEIGHT * size, FLAT_HEIGHT * size)
     for i in range(corners[2], len(x)):
         _insert(mesh, i)
@@ -146,7 +145,7 @@ def _triangulate_apart(x: Floats, corners: Ints, segments: Ints) -> tuple[Ints, 
         if _connect(mesh, begin, np.zeros(1), begin, end, way) != end or len(way) != 2:
             return none, none
     _improve(mesh)
-    return mesh.tri, np.where(mesh.fixed, -1, mesh.adj)
+    return mesh.tri[: mesh.room[1]], _across(mesh)
 
 
 AROUND = np.array([[-3.0, -2.0], [3.0, -2.0], [0.0, 3.0]])
@@ -181,6 +180,28 @@ def triangulate_polygon(points: Floats, n: int) -> Ints | None:
     left, right = (np.unique(regions[on.any(axis=1)]) for on in (forth, back))
     faces = tails[np.isin(regions, left)]
     return None if int(forth.sum()) != n or np.isin(left, right).any() or faces.min() < 0 else faces
+
+
+@compiled
+def _size(x: Floats) -> float:
+    """Return the longer side of the box of (n, 2) points."""
+    size = 0.0
+    for d in range(2):
+        least, most = np.inf, -np.inf
+        for i in range(len(x)):
+            least, most = min(least, x[i, d]), max(most, x[i, d])
+        size = max(size, most - least)
+    return size
+
+
+@compiled
+def _across(mesh: Planar) -> Ints:
+    """Return (t, 3) the triangle across each edge, or −1 across segments and sides."""
+    across = np.empty((mesh.room[1], 3), np.int64)
+    for t in range(len(across)):
+        for k in range(3):
+            across[t, k] = -1 if mesh.fixed[t, k] else mesh.adj[t, k]
+    return across
 
 
 @compiled
