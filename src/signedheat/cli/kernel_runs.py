@@ -5,16 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from scipy import sparse
 
 import signedheat as sh
 from signedheat import samples
 
+from ..linear.superlu import SuperLUFactor
 from ..shapes.inspection import inspect
 from ..solids.thickness import widths
 
 
 def solids() -> None:
-    """Run solids on grids: faces, points without normals, surfaces, sharpening, samples."""
+    """Run solids on grids: faces, loose ones too, points without normals, surfaces, sharpening, samples."""
     ball = samples.sphere(2)
     broken = samples.with_flipped_faces(samples.without_faces(samples.union(ball, samples.sphere(2, center=(1, 0, 0))),
                                                               0.1), 0.1)  # fmt: skip
@@ -22,10 +24,15 @@ def solids() -> None:
     field.offset(0.1)
     sh.sample_distances(field, 20)
     fine = sh.Grid.around(ball.bounds, 48)
-    sh.signed_distance(ball, fine, band=3 * float(fine.spacing.max())).offset(0.0)
+    narrow = sh.signed_distance(ball, fine, band=3 * float(fine.spacing.max()))
+    narrow.offset(0.0)
+    narrow.interpolate(ball.vertices)
     points = sh.PointCloud(ball.vertices)
     sh.signed_distance(points, sh.Grid.around(ball.bounds, 20))
-    sh.complete(samples.without_patches(ball, 1, 0.5)).surface()
+    sh.complete(samples.without_patches(ball, 2, 0.8)).surface()
+    whole = sh.complete(samples.soup(ball, 0.1))
+    whole.offset(0.1, corners="mitre", resolution=16)
+    (whole | sh.complete(ball)).surface()
     field = sh.SignedHeatSolver(sh.Grid.around(broken, 12)).distance(broken)
     sh.sharpen(field)
     sh.redistance(field)
@@ -46,8 +53,9 @@ def plane() -> None:
 
 
 def curves() -> None:
-    """Run exact distance, completion and jumps of curves on triangles."""
+    """Run exact distance, paths, completion and jumps of curves on triangles."""
     ball = samples.sphere(2)
+    ball.shortest_path(ball.vertices[3], ball.vertices[9])
     curve = _curve(ball)
     sh.signed_distance(curve, ball)
     sh.close_curves(curve, ball)
@@ -90,7 +98,17 @@ def tets() -> None:
     field = sh.SignedHeatSolver(sh.tetrahedralize(ball, resolution=5)).distance(ball)
     field.contour(0.1)
     sh.sharpen(field)
-    sh.signed_distance(ball, field.domain)
+    sh.signed_distance(ball, field.domain)(0.5 * ball.vertices)
+    hollow = sh.TetMesh(field.domain.vertices, field.domain.tets[:-1])
+    sh.SignedHeatSolver(hollow).distance(ball)
+
+
+def factors() -> None:
+    """Run SciPy's factors, which surfaces and tets need where there is no MKL, for real and complex matrices."""
+    for dtype in (np.float64, np.complex128):
+        factor = SuperLUFactor(sparse.csr_matrix(np.eye(3, dtype=dtype)))
+        factor.solve(np.ones(3))
+        factor.solve(np.ones((3, 2)))
 
 
 def _curve(ball: sh.TriangleMesh) -> sh.Curve:
@@ -107,5 +125,6 @@ JOBS: dict[str, Callable[[], None]] = {
     "points, polygons, voxels": other_surfaces,
     "reports": reports,
     "lines in the plane": plane,
+    "factors": factors,
 }
 """Functions of this module by what they run, the slowest first. They share few compiled functions."""
