@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import signedheat as sh
+from signedheat.cli import main
 from signedheat.cli.operands import prefix_errors
 
 TRIANGLE = sh.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
@@ -122,3 +123,49 @@ def test_warnings_name_the_line_of_the_caller(call):
     with pytest.warns(sh.errors.InexactWarning) as caught:
         call((ball.vertices, upper))
     assert {Path(warning.filename).name for warning in caught} == {Path(__file__).name}
+
+
+LONG = 100_000 * "a"
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: sh.read(f"{LONG}.stl"),
+        lambda: sh.read(LONG),
+        lambda: sh.read("/".join(1000 * [200 * "a"]) + ".stl"),
+        lambda: sh.read(f"{LONG}.stl\n\0"),
+        lambda: TRIANGLE.save(f"{LONG}.ply"),
+        lambda: sh.complete(TRIANGLE, lids=LONG),
+        lambda: sh.complete({LONG: LONG}),
+        lambda: sh.Grid((0, 0, 0), LONG, (3, 3, 3)),
+        lambda: sh.Grid((0, 0, 0), 10**10_000, (3, 3, 3)),
+        lambda: sh.complete(TRIANGLE, seal=[LONG]),
+        lambda: sh.Field(LONG, [1]),
+        lambda: sh.orient(TRIANGLE, *[LONG]),
+        lambda: sh.io.LabelImage(np.zeros((2, 2, 2)), np.eye(3), np.zeros(3), [LONG]),
+    ],
+)
+def test_messages_quote_no_more_than_some_characters(call):
+    with pytest.raises((sh.SignedHeatError, TypeError)) as caught:
+        call()
+    assert len(str(caught.value)) < 1000 and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        [LONG], ["info", LONG], ["info", f"{LONG}.stl"], ["info", "x.stl", f"--{LONG}"], ["info", "-", "--from", LONG],
+        ["volume", "x.stl", "-o", f"{LONG}.npz"], ["volume", "x.stl", "-o", "-", "--format", LONG],
+        *(["volume", "x.stl", "-o", "o.npz", option, LONG] for option in ("--resolution", "--spacing", "--constraint",
+          "--lids", "--transform", "--units", "--diffusion")),
+        ["batch", LONG, "-o", "out", "--info"], ["batch", "x.stl", "-o", LONG, "--info"],
+        ["batch", "x.stl", "-o", "out", "--volume", LONG], ["info", *(1000 * ["x.stl"]), f"--{LONG}", *(999 * ["-z"])],
+    ],
+    ids=lambda line: f"{line[0]:.9} {line[-2][:12] if len(line) > 1 else ''}",
+)  # fmt: skip
+def test_lines_of_commands_quote_no_more_than_some_characters(line, capfd, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    assert main(line) in (1, 2)
+    said = capfd.readouterr().err
+    assert len(said) < 1000 and said.count("\n") == 1

@@ -18,6 +18,9 @@ LONGEST_TEXT = 600
 """Number of characters up to which causes, remedies, elements and warnings are kept; longer ones are cut off. They may
 quote names and contents of files."""
 
+LONGEST_QUOTE = 60
+"""Number of characters up to which messages quote a value or a word of a file."""
+
 
 ENDINGS = {"ex": "ices", "y": "ies", "sh": "shes", "x": "xes"}
 """Plural endings of nouns by the endings of their singulars, as in "vertex" and "vertices". Others get an s."""
@@ -72,6 +75,33 @@ def shortened(text: str) -> str:
     """
     line = " ".join(text[: 2 * LONGEST_TEXT].split())
     return line if len(line) <= LONGEST_TEXT and len(text) <= 2 * LONGEST_TEXT else f"{line[: LONGEST_TEXT - 1]}…"
+
+
+def shortened_name(name: str) -> str:
+    """Cut the beginning of the name of a file, of which the end says more, so that `LONGEST_TEXT` characters are left.
+
+    Examples
+    --------
+    >>> shortened_name("part.stl"), len(shortened_name(10_000 * "part/" + "a.stl"))
+    ('part.stl', 600)
+    """
+    return name if len(name) <= LONGEST_TEXT else f"…{name[1 - LONGEST_TEXT :]}"
+
+
+def quoted(value: object) -> str:
+    """Return the `repr` of a value on one line, cut at `LONGEST_QUOTE` characters, for messages.
+
+    Examples
+    --------
+    >>> quoted("round"), len(quoted(10_000 * "a")), quoted(10**10_000)
+    ("'round'", 60, 'an int')
+    """
+    try:
+        line = " ".join(repr(value)[: 2 * LONGEST_TEXT].split())
+    except Exception:  # integers of too many digits have none, nor have some objects of users
+        kind = type(value).__name__
+        return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+    return line if len(line) <= LONGEST_QUOTE else f"{line[: LONGEST_QUOTE - 1]}…"
 
 
 def printable(text: str) -> str:
@@ -130,7 +160,8 @@ class SignedHeatError(ValueError):
         self.path: str | None = None if path is None else str(path)
 
     def __str__(self) -> str:
-        return ": ".join(printable(part) for part in (self.path, self.cause, self.remedy) if part is not None)
+        name = None if self.path is None else shortened_name(self.path)
+        return ": ".join(printable(part) for part in (name, self.cause, self.remedy) if part is not None)
 
     def at(self: AnyError, path: str | os.PathLike[str]) -> AnyError:
         """Copy the error, and name the file it concerns.

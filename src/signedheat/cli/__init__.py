@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 
 from .. import __version__
-from ..errors import SignedHeatError, printable
+from ..errors import SignedHeatError, printable, shortened
 from .options import (
     Parser,
     parser_of,
@@ -111,7 +111,7 @@ def _one_line(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "there is not enough memory: choose a lower resolution or a smaller shape"
     if _is_expected(error):
-        return printable(str(error))
+        return printable(str(error) if isinstance(error, SignedHeatError) else shortened(str(error)))
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from .. import __version__
-from ..errors import FileFormatError
+from ..errors import LONGEST_QUOTE, FileFormatError, shortened
 from ..jobs import MOST_THREADS
 from .terminal import say, write_out
 
@@ -82,7 +82,8 @@ class Parser(argparse.ArgumentParser):
         unknown = re.search(r"COMMAND: invalid choice: '([^']*)'", message)
         if unknown and unknown[1] in COMMANDS_OF_OTHERS:
             message = f"there is no command '{unknown[1]}': use {COMMANDS_OF_OTHERS[unknown[1]]}"
-        say(f"{self.prog}: {message} (see {self.prog} --help)")
+        words = (word if len(word) <= LONGEST_QUOTE else f"{word[: LONGEST_QUOTE - 1]}…" for word in message.split(" "))
+        say(f"{self.prog}: {shortened(' '.join(words))} (see {self.prog} --help)")
         raise SystemExit(2)
 
     def _print_message(self, message: str, file: object = None) -> None:
@@ -266,7 +267,7 @@ def finite(word: str) -> float:
 
 def ending(word: str) -> str:
     """Check that a word is an extension of files, and return it without its first dot."""
-    if not re.fullmatch(r"\.?\w+(\.gz)?", word):
+    if not re.fullmatch(r"\.?\w{1,20}(\.gz)?", word):
         raise argparse.ArgumentTypeError(f"{word!r} is not an extension of a file")
     return word.removeprefix(".")
 

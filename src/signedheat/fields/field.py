@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from ..arrays import Bools, Floats, Frozen
 from ..diagnostics import Diagnostics
 from ..discretization import SourceTerm
-from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError
+from ..errors import GeometryError, OutsideError, SourceError, UnsupportedTypeError, quoted
 from ..grids.band import Band
 from ..grids.grid import Grid
 from ..grids.polyline import Polyline
@@ -140,7 +140,7 @@ class Field(Displayed, Frozen, Generic[Domain]):
     def __post_init__(self) -> None:
         if not isinstance(self.domain, FieldDomain):
             raise UnsupportedTypeError(
-                f"{self.domain!r:.80} is no domain of fields",
+                f"{quoted(self.domain)} is no domain of fields",
                 remedy="pass a grid, tets or a surface",
                 element="domain",
             )

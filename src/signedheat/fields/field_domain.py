@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Floats, Ints
-from ..errors import GeometryError, UnsupportedTypeError
+from ..errors import GeometryError, UnsupportedTypeError, quoted
 from ..validation import contiguous
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class FieldDomain:
         array = contiguous(values, "values")
         if array.shape != self._values_shape:
             raise GeometryError(
-                f"values have shape {array.shape}, and {self!r:.120} needs {self._values_shape}", element="values"
+                f"values have shape {array.shape}, and {quoted(self)} needs {self._values_shape}", element="values"
             )
         return array
 

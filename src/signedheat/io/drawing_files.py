@@ -15,7 +15,7 @@ import numpy as np
 from ..arrays import Complexes, Floats
 from ..curves.drawings import FINEST_DRAWING
 from ..curves.outlines import distinct, outlines_filled
-from ..errors import FileFormatError, GeometryError
+from ..errors import FileFormatError, GeometryError, quoted
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
 from ..shapes.geometries import geometry_of, polylines_of
@@ -210,10 +210,10 @@ def length(word: str, whole: float = math.nan, name: str = "length") -> float:
     if word.strip() == "auto":
         return 0.0
     if match is None or (unit != "%" and unit not in SVG_UNITS):
-        raise damaged(f"{name} is '{word:.40}', which is not a length", element=name)
+        raise damaged(f"{name} is {quoted(word)}, which is not a length", element=name)
     value = _finite(match, name) * (whole / 100 if unit == "%" else SVG_UNITS[unit])
     if not math.isfinite(value):
-        raise FileFormatError(f"{name} is '{word:.40}' of a drawing without a size", remedy="give it a viewBox")
+        raise FileFormatError(f"{name} is {quoted(word)} of a drawing without a size", remedy="give it a viewBox")
     return value
 
 
@@ -221,7 +221,7 @@ def _finite(match: re.Match[str], name: str) -> float:
     """Return the number that `NUMBER` or `FLAG` matched; raise an error if it is too large for a float."""
     value = float(match[1])
     if math.isinf(value):
-        raise damaged(f"{name} has a number that is too large, {match[1]:.40}", element=name)
+        raise damaged(f"{name} has a number that is too large, {quoted(match[1])}", element=name)
     return value
 
 
@@ -275,7 +275,7 @@ def _transform(text: str) -> Floats:
         elif kind in ("skewX", "skewY") and numbers:
             step[(0, 1) if kind == "skewX" else (1, 0)] = math.tan(math.radians(numbers[0]))
         else:
-            raise damaged(f"'{written:.40}' is not a transform", element="transform")
+            raise damaged(f"{quoted(written)} is not a transform", element="transform")
         matrix = matrix @ step
     return matrix
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats
-from ..errors import FileFormatError
+from ..errors import FileFormatError, quoted
 from ..packages import lazy_module
 from ..validation import numbers
 from .budgets import charge, charge_words
@@ -178,7 +178,7 @@ def _nrrd_vectors(text: str) -> Floats:
     """Parse (n, d) vectors like ``(1,0,0) (0,1,0)``; the word ``none``, for axes outside of space, gives NaN."""
     rows = [part.strip(" (").split(",") for part in text.replace("none", "(nan)").split(")")[:-1]]
     if not rows:
-        raise damaged(f"'{text:.40}' are no vectors")
+        raise damaged(f"{quoted(text)} are no vectors")
     width = max(map(len, rows))
     return parsed_numbers([row if len(row) == width else width * ["nan"] for row in rows], "vectors")
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Ints
-from ..errors import FileFormatError, InexactWarning, warn_user
+from ..errors import FileFormatError, InexactWarning, quoted, warn_user
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import distinct_rows, same_positions
 from ..shapes.exchange import Elements
@@ -186,7 +186,7 @@ def _lines_by_keyword(path: PathLike) -> dict[str, list[list[Any]]]:
             words[0] = len(lines["v"])
         elif words and words[0] not in KEYWORDS and NUMBER_LINE.fullmatch(" ".join(words[1:])):
             raise FileFormatError(
-                f"line {number} begins with '{words[0]:.20}', which is not an OBJ keyword",
+                f"line {number} begins with {quoted(words[0])}, which is not an OBJ keyword",
                 remedy="correct or remove it",
                 element=f"line {number}",
             )
@@ -218,7 +218,9 @@ def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
     if any("/" in word for word in flat):
         wrong = next((word for word in flat if not CORNER.fullmatch(word)), None)
         if wrong is not None:
-            raise damaged(f"'{wrong:.40}' is no corner, such as 1, 1/2, 1//3 or 1/2/3", element=f"corner {wrong:.40}")
+            raise damaged(
+                f"{quoted(wrong)} is no corner, such as 1, 1/2, 1//3 or 1/2/3", element=f"corner {quoted(wrong)}"
+            )
         flat = [word.partition("/")[0] for word in flat]
     ids = integers(flat, "vertex ids")
     if (ids == 0).any():

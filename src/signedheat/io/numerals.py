@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Ints
-from ..errors import FileFormatError
+from ..errors import FileFormatError, quoted
 from ..validation import INT64_END, numbers
 from .budgets import JSON, charge_tree
 from .files import damaged
@@ -59,7 +59,7 @@ def finite_numbers(words: Sequence[str], name: str) -> Floats:
     wrong = ~np.isfinite(array)
     if wrong.any():
         k = int(np.argmax(wrong))
-        raise damaged(f"number {k} of {name} is not finite, but {words[k]:.40}", element=f"number {k}")
+        raise damaged(f"number {k} of {name} is not finite, but {quoted(words[k])}", element=f"number {k}")
     return array
 
 
@@ -167,4 +167,4 @@ def _no_numbers(name: str, kind: str, error: Exception) -> FileFormatError:
 
 def _shown(value: object) -> str:
     """Return a short description of a value for messages."""
-    return f"{value!r:.40}" if isinstance(value, str | bytes | int | float | None) else f"a {type(value).__name__}"
+    return quoted(value) if isinstance(value, str | bytes | int | float | None) else f"a {type(value).__name__}"

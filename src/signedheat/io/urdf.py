@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, quoted
 from .budgets import XML, charge_tree
 from .files import PathLike, contents, reading
 from .numerals import parsed_numbers
@@ -30,14 +30,14 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
         except ElementTree.ParseError as error:
             raise FileFormatError(f"it is no XML ({error})", remedy="expand macros first: xacro robot.xacro") from error
         if root.tag != "robot":
-            raise FileFormatError(f"its root is <{root.tag:.40}>, not <robot>", remedy="name a URDF file")
+            raise FileFormatError(f"its root is {quoted(root.tag)}, not robot", remedy="name a URDF file")
         meshes: dict[tuple[Path, Scale], None] = {}
         for mesh in root.iter("mesh"):
             name = mesh.get("filename", "")
             scale = parsed_numbers(mesh.get("scale", "1 1 1").split(), "a scale")
             if not name or "\0" in name or len(scale) != 3 or not (np.isfinite(scale) & (scale != 0)).all():
                 raise FileFormatError(
-                    f"a mesh has the name {name!r:.80} and the scale {mesh.get('scale')!r:.40}",
+                    f"a mesh has the name {quoted(name)} and the scale {quoted(mesh.get('scale'))}",
                     remedy="give a name, and three finite numbers that are not 0",
                 )
             x, y, z = map(float, scale)

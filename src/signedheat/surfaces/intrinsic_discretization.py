@@ -10,7 +10,7 @@ import numpy as np
 
 from ..diagnostics import IntrinsicTriangles
 from ..discretization import discretize
-from ..errors import GeometryError, SignedHeatError
+from ..errors import GeometryError, SignedHeatError, quoted
 from ..jobs import Progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
 from .intrinsic_triangulation import LARGEST_ANGLE, IntrinsicTriangulation, intrinsic_delaunay
@@ -93,7 +93,7 @@ def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
 def checked_intrinsic(intrinsic: bool | Literal["auto"]) -> bool | Literal["auto"]:
     """Return the option `intrinsic` of `SignedHeatSolver` if it is valid, and raise `SignedHeatError` otherwise."""
     if not (isinstance(intrinsic, bool) or (isinstance(intrinsic, str) and intrinsic == "auto")):
-        raise SignedHeatError(f"intrinsic must be 'auto', True or False, not {intrinsic!r:.40}", element="intrinsic")
+        raise SignedHeatError(f"intrinsic must be 'auto', True or False, not {quoted(intrinsic)}", element="intrinsic")
     return intrinsic
 
 
