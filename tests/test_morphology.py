@@ -217,8 +217,8 @@ def test_a_disk_on_a_plane_grows():
 @pytest.mark.parametrize(
     ("call", "kind", "element"),
     [
-        (lambda: sh.morphology.dilate(BALL, -0.1), sh.errors.SignedHeatError, "the distance"),
-        (lambda: sh.morphology.dilate(BALL, np.nan), sh.errors.SignedHeatError, "the distance"),
+        (lambda: sh.morphology.dilate(BALL, -0.1), sh.errors.SignedHeatError, "distance"),
+        (lambda: sh.morphology.dilate(BALL, np.nan), sh.errors.SignedHeatError, "distance"),
         (lambda: sh.morphology.erode(BALL, 2.0, resolution=32), sh.errors.OutsideError, "level -2"),
         (lambda: sh.morphology.shell(BALL, 0.2, 0.1), sh.errors.SignedHeatError, None),
         (lambda: sh.morphology.shell(BALL, 0.0, 0.001, resolution=32), sh.errors.SignedHeatError, None),

@@ -34,7 +34,7 @@ from .surfaces.polygon_mesh import PolygonMesh
 from .surfaces.surface_curves import Curve, CurvesAndPoints, ElementList, SurfacePoints
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .validation import are_points, positive_number, public_call, refuse_beside
+from .validation import are_points, public_call, refuse_beside
 
 OF_DEFAULT_GRID = ("resolution", "spacing", "padding")
 """Options of `signed_distance` that define the default grid, and are refused if a domain is given."""
@@ -414,7 +414,7 @@ def distance_to_shapes(
 ) -> Field[Grid] | Field[TetMesh]:
     """Compute the signed distance to shapes in space on a grid or on tets, with the options of `signed_distance`."""
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
-    method = Heat(checked(constraint), positive_number(diffusion, "diffusion"))
+    method = Heat(checked(constraint), diffusion)
     joined = joined_shape(shape)
     if domain is None:
         domain = Grid.around(bounds_around([joined]), resolution, padding, spacing)

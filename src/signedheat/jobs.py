@@ -96,8 +96,14 @@ class Stopwatch:
         yield lambda job: run_cancellable(job, report)
         self.seconds[step] = time.perf_counter() - begin
         logger.info("%s: %.3f s", step, self.seconds[step])
-        if self._progress is not None and len(self.seconds) == self._steps:
-            self._progress(1.0, "done")
+        if len(self.seconds) == self._steps:
+            finish(self._progress)
+
+
+def finish(progress: Progress | None) -> None:
+    """Report that a computation is done."""
+    if progress is not None:
+        progress(1.0, "done")
 
 
 def within(progress: Progress | None, start: float, stop: float) -> Progress | None:

@@ -428,7 +428,7 @@ def offset(
     elif (values := numbers(distance, "distance", SignedHeatError)).ndim:
         reach, largest = checked_reach(_linear(shape, values)), float(values.max(initial=0.0))
     else:
-        reach = largest = finite_number(distance, "the distance")
+        reach = largest = finite_number(distance, "distance")
     sides = np.array([[-1.0], [1.0]])
     grid = Grid.around(solid.bounds + sides * max(largest, 0.0), resolution, None, spacing)
     if MITRE_LIMITS[corners] > 1:  # cells as large as above, so that corners do not change the resolution
@@ -501,7 +501,7 @@ def shell(
     >>> wall.bounds.round(1).tolist()
     [[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]]
     """
-    inner, outer = finite_number(inner, "the inner distance"), finite_number(outer, "the outer distance")
+    inner, outer = finite_number(inner, "inner"), finite_number(outer, "outer")
     if not inner < outer:
         raise SignedHeatError(
             f"a shell needs inner < outer, not {inner:g} and {outer:g}", remedy="swap them, or make them different"
@@ -598,13 +598,13 @@ def thicken(
     >>> np.abs(thicken(sheet, 0.1, side="outside", resolution=40).bounds).round(6).tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.1]]
     """
-    above = finite_number(above, "the reach above", least=0)
+    above = finite_number(above, "above", least=0)
     chosen(side, Side, "side")
     if below is not None and side != "both":
         raise SignedHeatError("side must be both if `below` is given", element="side", remedy="leave out one of them")
     if below is None:
         above, below = above if side != "inside" else 0.0, above if side != "outside" else 0.0
-    below = finite_number(below, "the reach below", least=0)
+    below = finite_number(below, "below", least=0)
     reach = max(above, below)
     if reach == 0:
         raise SignedHeatError("a sheet of thickness 0 has no inside", remedy="give a thickness above 0")
@@ -725,7 +725,7 @@ def _offsets(
     measure: Measure,
 ) -> Boundary:
     """Offset a shape once for each of the signs, outward for 1 and inward for −1, computing the distance each time."""
-    distance = finite_number(distance, "the distance", least=0)
+    distance = finite_number(distance, "distance", least=0)
     callback(measure, "measure(shape, domain)")
     domain = _given_or_room(domain, shape, distance if 1 in signs else 0.0, resolution)
     for sign in signs:

@@ -13,7 +13,7 @@ from .grids.grid import Grid
 from .shapes.transforms import joined_triangles
 from .surfaces.point_cloud import PointCloud
 from .surfaces.triangle_mesh import TriangleMesh
-from .validation import whole_number
+from .validation import positive_number, whole_number
 
 __all__ = [
     "broken_duck", "duck", "oriented_points", "soup", "sphere", "torus", "union", "with_duplicate_faces",
@@ -67,7 +67,7 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
                 np.stack([ab, bc, ca], axis=1),
             ]
         )
-    points *= radius / np.linalg.norm(points, axis=1, keepdims=True)
+    points *= positive_number(radius, "radius") / np.linalg.norm(points, axis=1, keepdims=True)
     return TriangleMesh(points + np.asarray(center), faces)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
-from .errors import FileFormatError, GeometryError, SignedHeatError, UnsupportedTypeError, counted
+from .errors import FileFormatError, GeometryError, SignedHeatError, UnsupportedTypeError, counted, quoted
 from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -29,6 +29,8 @@ computed, then stay finite."""
 SMALLEST_EXTENT = 1e-40
 """Smallest extent that is accepted, except 0. Powers of smaller lengths would vanish."""
 INT64_END = 2**63
+NO_NUMBERS = (type(None), str, bytes, np.datetime64, np.timedelta64)
+"""Types that NumPy converts to numbers, and that are none."""
 
 
 def frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
@@ -46,10 +48,10 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
     """Return `values` as a new float64 array of any shape; raise an error unless they are real numbers."""
     array = array_of(values, name, error)
     try:
-        if array.dtype.kind not in "biufO":
+        if array.dtype.kind not in "biufO" or (array.dtype.kind == "b" and array.ndim == 0):
             raise TypeError
-        if array.dtype.kind == "O" and any(value is None or isinstance(value, str | bytes) for value in array.flat):
-            raise TypeError  # NumPy would convert None to NaN, and parse text
+        if array.dtype.kind == "O" and any(isinstance(value, NO_NUMBERS) for value in array.flat):
+            raise TypeError  # NumPy would convert None to NaN, dates to nanoseconds, and parse text
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # refuse what would lose something in the conversion
             return np.array(array, dtype=np.float64)
@@ -92,7 +94,7 @@ def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryE
 
 def _described(array: NDArray[Any]) -> str:
     """Return a text for error messages: the value of a 0-d array, and the type of others."""
-    return f"an array of {array.dtype}" if array.ndim else " ".join(f"{array[()]!r:.50}".split())
+    return f"an array of {array.dtype}" if array.ndim else quoted(array[()])
 
 
 def finite_rows(
@@ -190,7 +192,7 @@ def finite_number(
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool) or not isinstance(value, Real):
-        described = _described(value) if isinstance(value, np.ndarray) else " ".join(f"{value!r:.60}".split())
+        described = _described(value) if isinstance(value, np.ndarray) else quoted(value)
         raise error(f"{name} must be a number, not {described}", element=name)
     try:
         number = float(value)
@@ -231,7 +233,7 @@ def boolean(values: object, name: str, error: type[SignedHeatError] = GeometryEr
 def flag(value: object, name: str) -> bool:
     """Return `value` as a bool; raise an error for anything but True and False."""
     if not isinstance(value, bool | np.bool_):
-        raise SignedHeatError(f"{name} must be True or False, not {value!r:.50}", element=name)
+        raise SignedHeatError(f"{name} must be True or False, not {quoted(value)}", element=name)
     return bool(value)
 
 
@@ -261,7 +263,7 @@ def chosen(value: object, choices: object, name: str) -> None:
     allowed = get_args(choices)
     if not isinstance(value, str) or value not in allowed:
         listed = " or ".join(f'"{choice}"' for choice in allowed)
-        raise SignedHeatError(f"{name} must be {listed}, not {value!r:.50}", element=name)
+        raise SignedHeatError(f"{name} must be {listed}, not {quoted(value)}", element=name)
 
 
 def refuse_beside(given: str, **options: object) -> None:
@@ -416,7 +418,7 @@ def is_pair(thing: object) -> bool:
     points, faces = thing
     try:
         positions = np.asanyarray(points, dtype=np.float64)
-    except (TypeError, ValueError, RuntimeError):
+    except (TypeError, ValueError, RuntimeError, OverflowError):
         return False
     return positions.ndim == 2 and positions.shape[1] == 3 and _like_ids(faces)
 

@@ -286,7 +286,7 @@ def test_odd_numbers_of_workers(tmp_path, name, odd):
 
 @pytest.mark.parametrize("odd", [0, -1, np.nan, np.inf, "long", 1e30])
 def test_odd_time_limits(tmp_path, odd):
-    with refused(sh.errors.SignedHeatError, "time limit"):
+    with refused(sh.errors.SignedHeatError, "time_limit"):
         sh.batches.run("shape.stl", tmp_path / "made", sh.batches.Job(info=True), time_limit=odd)
     assert not (tmp_path / "made").exists()
 

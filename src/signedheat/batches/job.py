@@ -42,14 +42,23 @@ from ..solids.heat_surfaces import Heat
 from ..solids.kept_faces import kept_surface
 from ..solids.overlaps import Nesting
 from ..solids.sample_set import NOISE_WIDTHS, Layout
-from ..solids.sampling import sample_distances, training_points
+from ..solids.sampling import refuse_odd_sampling, sample_distances, training_points
 from ..solids.simplification import simplified
 from ..solids.solid import Solid
 from ..solver import checked
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import finite_number, positive_number, whole_number
+from ..validation import chosen, finite_number, flag, instance, positive_number, positive_steps, whole_number
 from .inputs import Input
+
+
+def _refuse_odd_grid(resolution: int, spacing: float | tuple[float, ...] | None, padding: float | None) -> None:
+    """Raise an error if options of a grid around a shape in space are no numbers in their range."""
+    whole_number(resolution, "resolution", 2)
+    if spacing is not None:
+        positive_steps(spacing, 3)
+    if padding is not None:
+        finite_number(padding, "padding", 0)
 
 
 @dataclass(frozen=True)
@@ -88,6 +97,11 @@ class Sampling:
     seed: int = 0
     normalize: bool = False
     layout: Layout = "arrays"
+
+    def __post_init__(self) -> None:
+        refuse_odd_sampling(self.n, self.near, self.widths, self.seed)
+        flag(self.normalize, "normalize")
+        chosen(self.layout, Layout, "layout")
 
 
 @dataclass(frozen=True)
@@ -161,18 +175,22 @@ class Job:
     completion: Completing = "lids"
 
     def __post_init__(self) -> None:
-        given = self.offsets if isinstance(self.offsets, Iterable) else [self.offsets]
-        object.__setattr__(self, "offsets", tuple(finite_number(offset, "an offset") for offset in given))
+        are_several = isinstance(self.offsets, Iterable) and getattr(self.offsets, "ndim", 1) != 0
+        given = self.offsets if are_several else [self.offsets]
+        object.__setattr__(self, "offsets", tuple(finite_number(offset, "offsets") for offset in given))
         for ending, formats in ((self.volume, FIELD_FORMATS), (self.surfaces, SHAPE_FORMATS)):
-            if ending is not None and ending not in formats:
+            if ending is not None and not (isinstance(ending, str) and ending in formats):
                 raise FileFormatError(f"{ending!r} is no extension", remedy=f"use one of {' '.join(sorted(formats))}")
+        for name in ("info", "as_oriented", "keep_overlaps", "plain"):
+            flag(getattr(self, name), name)
+        _refuse_odd_grid(self.resolution, self.spacing, self.padding)
         if self.band is not None:
             positive_number(self.band, "band")
         if not isinstance(self.samples, Sampling | None):
             kind = type(self.samples).__name__
             raise UnsupportedTypeError(f"a {kind} is no Sampling", remedy="pass Sampling(n=…)", element="samples")
         reach = max(map(abs, self.offsets), default=0.0)
-        plain = is_plain(self.plain, self._method)
+        plain, completion = is_plain(self.plain, self._method), replace(self._completion, as_oriented=False)
         cause = remedy = ""
         if not (self._measures or self.info):
             cause, remedy = "the job has no results", "ask for a volume, offsets, samples or info"
@@ -180,7 +198,7 @@ class Job:
             result = "samples" if self.samples is not None else "a band"
             cause = f"a plain field has no distances to the shape, as {result} would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
-        elif plain and replace(self._completion, as_oriented=False) != Completion():
+        elif plain and completion != Completion():
             cause = "a plain field has no solid, as completion, lids, nested and keep_overlaps would need"
             remedy = "leave out plain" if self.plain else "take another constraint"
         elif self.band is not None and self.volume not in (None, *BAND_FORMATS):
@@ -194,7 +212,7 @@ class Job:
     @property
     def _method(self) -> Heat:
         """Constraint and diffusion of the method."""
-        return Heat(checked(self.constraint), positive_number(self.diffusion, "diffusion"))
+        return Heat(checked(self.constraint), self.diffusion)
 
     @property
     def _completion(self) -> Completion:
@@ -349,15 +367,16 @@ class Watertight:
 
     def __post_init__(self) -> None:
         if self.samples is not None:
-            whole_number(self.samples, "the number of samples", 1, SignedHeatError)
-        if self.thickness is not None:
-            positive_number(self.thickness, "thickness")
-        if self.tolerance is not None:
-            positive_number(self.tolerance, "tolerance")
-        if self.seal is not None:
-            positive_number(self.seal, "seal")
-        if self.smallest is not None:
-            positive_number(self.smallest, "smallest")
+            whole_number(self.samples, "samples", 1, SignedHeatError)
+        for name in ("contoured", "normalize"):
+            flag(getattr(self, name), name)
+        for name in ("thickness", "tolerance", "seal", "smallest"):
+            if getattr(self, name) is not None:
+                positive_number(getattr(self, name), name)
+        if self.label is not None:
+            finite_number(self.label, "label")
+        _refuse_odd_grid(RESOLUTION if self.resolution is None else self.resolution, self.spacing, None)
+        instance(self.units, str, "units")
         for unit in (self.units or "m").split(":"):
             if unit not in METRES:
                 raise SignedHeatError(f"{unit!r} is not a unit", element="units", remedy=f"use {', '.join(METRES)}")

@@ -393,7 +393,7 @@ def run(
     callback(progress, "progress(fraction, text)")
     if scheduler is not None:
         require("distributed", "clusters")
-    _refuse_odd(workers, threads, time_limit)
+    workers, threads, time_limit = _checked_limits(workers, threads, time_limit)
     target = named_path(folder)
     refuse_deleted_folder(target)
     if os.path.lexists(target) and not target.is_dir():
@@ -452,14 +452,18 @@ def _description_of(job: Function) -> str:
     return f"{text} by {package} {import_module(package).__version__}"
 
 
-def _refuse_odd(workers: object, threads: object, time_limit: object) -> None:
-    """Raise an error if numbers of processes, threads or seconds are out of range."""
-    for name, number in (("workers", 1 if workers is None else workers), ("threads", threads)):
-        if whole_number(number, name, 1, SignedHeatError) > MOST_THREADS:
+def _checked_limits(workers: object, threads: object, time_limit: object) -> tuple[int | None, int, float | None]:
+    """Return numbers of processes, threads and seconds, None where none is given; raise an error if out of range."""
+    numbers = {"threads": threads} | ({} if workers is None else {"workers": workers})
+    counts = {name: whole_number(n, name, 1, SignedHeatError) for name, n in numbers.items()}
+    for name, number in counts.items():
+        if number > MOST_THREADS:
             raise SignedHeatError(f"{name} must be at most {MOST_THREADS}, not {number}", element=name)
-    if time_limit is not None and positive_number(time_limit, "time limit") > threading.TIMEOUT_MAX:
-        cause = f"the time limit is {time_limit:g} s, which is too long to wait"
-        raise SignedHeatError(cause, remedy="leave it out", element="time limit")
+    seconds = None if time_limit is None else positive_number(time_limit, "time_limit")
+    if seconds is not None and seconds > threading.TIMEOUT_MAX:
+        cause = f"the time limit is {seconds:g} s, which is too long to wait"
+        raise SignedHeatError(cause, remedy="leave it out", element="time_limit")
+    return counts.get("workers"), counts["threads"], seconds
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from ..surfaces.source_segments import NEARLY_CLOSED, as_curves, nearest_others
 from ..surfaces.surface_curves import Curve, CurveOrPoints, CurvesAndPoints, ElementList
 from ..surfaces.surface_discretization import SurfaceDiscretization
 from ..surfaces.surface_sharpening import curve_sides
+from ..validation import finite_number
 from .resolution import flattened, on_resolving_triangles, surface_of, triangulated_once
 from .strokes import EQUAL_COSTS, EXPLAINED, Inside, Strokes
 
@@ -427,7 +428,8 @@ class CurveOrientation(Frozen, ShortRepr):
         >>> len(sh.orientation(equator, mesh).agreeing(0.5))
         1
         """
-        return [curve for curve, agreement in zip(self.curves, self.agreement, strict=True) if agreement >= least]
+        threshold = finite_number(least, "least")
+        return [curve for curve, agreement in zip(self.curves, self.agreement, strict=True) if agreement >= threshold]
 
 
 def curve_orientation(

@@ -50,7 +50,7 @@ def smooth_union(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field
     >>> float((left | right)([0.0, 0.5]).round(3)), float(smooth_union(left, right, 0.4)([0.0, 0.5]).round(3))
     (0.118, 0.018)
     """
-    return combined(a, b, np.less_equal, -finite_number(width, "the width of the blend", least=0))
+    return combined(a, b, np.less_equal, -finite_number(width, "width", least=0))
 
 
 def smooth_intersection(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:
@@ -93,7 +93,7 @@ def smooth_intersection(a: Field[Domain], b: Field[FieldDomain], width: float) -
     >>> float((left & right)([0.0, 0.5]).round(3)), float(smooth_intersection(left, right, 0.4)([0.0, 0.5]).round(3))
     (-0.293, -0.193)
     """
-    return combined(a, b, np.greater_equal, finite_number(width, "the width of the blend", least=0))
+    return combined(a, b, np.greater_equal, finite_number(width, "width", least=0))
 
 
 def smooth_difference(a: Field[Domain], b: Field[FieldDomain], width: float) -> Field[Domain]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Floats, Frozen, read_only, short
-from ..errors import FileFormatError, GeometryError
+from ..errors import FileFormatError, GeometryError, quoted
 from ..fields.field import Field
 from ..grids.grid import Grid
 from ..packages import require
@@ -20,7 +20,7 @@ from ..shapes.transforms import transform
 from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import array_of, numbers
+from ..validation import array_of, finite_number, numbers
 from .budgets import charge
 from .field_files import CONVENTION, ensure_field_writable, made, save_field
 from .files import PathLike, ensure_writable, extension, reading, replacing
@@ -111,7 +111,7 @@ class LabelImage(Represented, Frozen):
             )
         if self.space is not None and not isinstance(self.space, str):
             raise GeometryError(
-                f"the space of an image is named by words, not {self.space!r:.50}",
+                f"the space of an image is named by words, not {quoted(self.space)}",
                 remedy='pass for instance space="left-posterior-superior"',
                 element="space",
             )
@@ -169,7 +169,9 @@ class LabelImage(Represented, Frozen):
         >>> image.surface(7).bounds.tolist() == image.surface().bounds.tolist()
         True
         """
-        if label is None:
+        if label is not None:
+            label = finite_number(label, "label", error=GeometryError)
+        else:
             present = np.unique(self.labels)
             others = present[present != 0]
             if len(others) != 1:
@@ -391,7 +393,7 @@ def read_volume(path: PathLike, level: float | None = None, radius: float | None
         charge(bytes=BYTES_PER_READ_VOXEL * image.values.size)
         if image.values.ndim != 3:
             raise FileFormatError(f"a volume has 3 axes, and the image has {image.values.ndim}")
-        inside = image.values if level is None else image.values > level
+        inside = image.values if level is None else image.values > finite_number(level, "level")
         return DigitalSurface(inside, image.spacing, image.origin, radius)
 
 

@@ -16,7 +16,7 @@ from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note, ShapeOriented, SmallParts
 from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
-from ..jobs import Progress, Stopwatch
+from ..jobs import Progress, Stopwatch, finish
 from ..linear.threads import one_blas_thread
 from ..memory import refuse_beyond_memory
 from ..mesh.arrangement import SAME_POINT
@@ -134,7 +134,7 @@ class Completion:
             flag(getattr(self, name), name)
         for name in ("seal", "smallest"):
             if getattr(self, name) is not None:
-                positive_number(getattr(self, name), name)
+                object.__setattr__(self, name, positive_number(getattr(self, name), name))
 
 
 @public_call
@@ -245,12 +245,14 @@ def completed(
             remedy="use SignedHeatSolver.distance",
         )
     if isinstance(shape, Solid):
+        finish(progress)
         return shape
     joined = joined_shape(shape)
     if options.smallest is not None and not isinstance(joined, PointCloud):
         kept = large_parts(joined.triangulation, options.smallest)
         return _completed_instead(joined, *kept, replace(options, smallest=None), method, progress)
     if options.completion == "none":
+        finish(progress)
         return _sheet(joined)
     if options.seal is not None and not isinstance(joined, PointCloud):
         skin = sealed(joined.triangulation, options.seal)

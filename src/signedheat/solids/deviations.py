@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from os import PathLike
 from typing import Any
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import SourceError, counted
-from ..jobs import Progress
+from ..jobs import Progress, Stopwatch, within
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
 from ..search.face_tree import EQUALLY_NEAR, FaceFeatures, FaceTree, NearestFaces
@@ -23,7 +23,7 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from ..validation import finite_number, percentages, public_call
+from ..validation import finite_number, percentages, public_call, whole_number
 from .completion import complete
 from .mesh_orientation import agreeing_faces, owners_of
 from .solid import Solid
@@ -195,7 +195,7 @@ class Deviation(Frozen):
         """
         reach = self.extreme if self.extreme > 0 else 1.0
         inside = np.clip(self.of_surface, -reach, reach)
-        counts, limits = np.histogram(inside, bins, (-reach, reach))
+        counts, limits = np.histogram(inside, whole_number(bins, "bins", 1), (-reach, reach))
         return counts.astype(np.int64), limits
 
     def worst(self, n: int = 10) -> Ints:
@@ -225,6 +225,7 @@ class Deviation(Frozen):
         >>> len(off.worst(3)), bool(abs(off.distances[off.worst(1)[0]]) == abs(off.distances).max())
         (3, True)
         """
+        n = whole_number(n, "n", 0)
         ids = self._ids[np.argsort(-np.abs(self.of_surface), kind="stable")]
         reach = WORST_SPACING * float(np.linalg.norm(np.ptp(self.points[ids], axis=0)))
         chosen: list[int] = []
@@ -339,10 +340,18 @@ def deviation(
         shape = shape.boundary
     if not isinstance(shape, PointCloud | TriangleMesh | PolygonMesh):
         raise SourceError(f"a {type(shape).__name__} is not a scan", remedy=what_to_pass(shape), element="scan")
-    solid = complete(nominal, progress=progress)
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")
+    solid = complete(nominal, progress=within(progress, 0.0, 0.5))
+    with Stopwatch(within(progress, 0.5, 1.0), 1)("measure") as run:
+        return run(partial(_measured, shape, points, solid, nominal))
+
+
+def _measured(
+    scan: PointCloud | TriangleMesh | PolygonMesh, points: Floats, solid: Solid, nominal: ShapeLike
+) -> Deviation:
+    """Measure the deviations of the (n, 3) points or vertices of a scan from a part and the solid made of it."""
     closest = solid.closest(points)
     distances, nearest, completed = closest.distances, closest.points, closest.completed
     beyond_rim = np.zeros(len(points), dtype=bool)
@@ -355,7 +364,7 @@ def deviation(
         distances, completed = np.where(by_side, signed, distances), completed & ~by_side
         nearest = np.where(by_side[:, None], front.places, nearest)
         beyond_rim = by_side & _beyond_rim(surface, front)
-    return Deviation(shape, distances, nearest, completed, beyond_rim)
+    return Deviation(scan, distances, nearest, completed, beyond_rim)
 
 
 def _open_surface(solid: Solid, given: SurfaceShape | Solid) -> tuple[bool, FaceFeatures | None]:

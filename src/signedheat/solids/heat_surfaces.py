@@ -29,6 +29,7 @@ from ..parallel import in_threads
 from ..shapes.area_elements import AreaSamples, sample_on_grid
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import positive_number
 from .point_orientation import fitted_to_points
 
 DIPOLE_CELLS = 4
@@ -165,6 +166,9 @@ class Heat:
 
     constraint: Constraint | None = None
     diffusion: float = 1.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
 
 
 def heat_surface(shape: TriangleMesh | PointCloud, method: Heat, cell: float = 0.0) -> tuple[Floats, Ints] | None:

@@ -16,7 +16,7 @@ from ..mesh.triangles import bent_edges, face_areas
 from ..mesh.unit_vectors import unit
 from ..shapes.kinds import Shapes
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import finite_number, public_call, whole_number
+from ..validation import finite_number, numbers, public_call, whole_number
 from .completion import complete
 from .sample_set import NOISE_WIDTHS, Samples
 
@@ -85,16 +85,8 @@ def sample_distances(
     >>> bool(np.quantile(away, 0.9) < 0.01 and away.max() < 0.1)
     True
     """
-    n = whole_number(n, "the number of samples", 1, SignedHeatError)
+    n, scales, seed = refuse_odd_sampling(n, near, widths, seed)
     refuse_beyond_memory(f"{n} samples", n, lambda k: BYTES_PER_SAMPLE * k, lambda k: f"take {k} at a time")
-    seed = whole_number(seed, "the seed", 0, SignedHeatError)
-    if not 0 <= finite_number(near, "near") <= 1:
-        raise SignedHeatError(f"near must be a share from 0 to 1, not {near:g}", element="near")
-    if near and not np.size(widths):
-        raise SignedHeatError(
-            "points near the surface need a width of noise", remedy="give widths, or near=0", element="widths"
-        )
-    scales = [finite_number(width, "the width of the noise", least=0) for width in np.atleast_1d(widths)]
     n_near = round(near * n)
     solid = shape.solid if isinstance(shape, Field) else complete(shape)
     if solid is None or solid.triangles.shape[-1] != 3:
@@ -119,6 +111,19 @@ def sample_distances(
     closest = solid.closest(points)
     is_near = np.arange(n) < n_near
     return Samples(points, closest.distances, closest.gradients, is_near, closest.completed, center, radius)
+
+
+def refuse_odd_sampling(n: object, near: object, widths: object, seed: object) -> tuple[int, list[float], int]:
+    """Return the number of samples, widths and seed of `sample_distances`; raise an error if one is out of range."""
+    counts = whole_number(n, "n", 1, SignedHeatError), whole_number(seed, "seed", 0, SignedHeatError)
+    share, scales = finite_number(near, "near"), np.atleast_1d(numbers(widths, "widths", SignedHeatError))
+    if not 0 <= share <= 1:
+        raise SignedHeatError(f"near must be a share from 0 to 1, not {share:g}", element="near")
+    if share and not scales.size:
+        raise SignedHeatError(
+            "points near the surface need a width of noise", remedy="give widths, or near=0", element="widths"
+        )
+    return counts[0], [finite_number(width, "widths", least=0) for width in scales.ravel()], counts[1]
 
 
 def evenly_on(triangles: Floats, n: int, random: np.random.Generator) -> tuple[Floats, Ints]:

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import chain
-from numbers import Real
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -28,7 +27,17 @@ from ..mesh.surface_points import refuse_missing
 from ..mesh.triangles import gradients_along
 from ..shapes.exchange import Displayed
 from ..shapes.foreign import ForeignShape, converted
-from ..validation import finite_rows, flag, frozen, public_call, shaped, whole_numbers
+from ..validation import (
+    finite_number,
+    finite_rows,
+    flag,
+    frozen,
+    positive_number,
+    public_call,
+    shaped,
+    whole_number,
+    whole_numbers,
+)
 from .intrinsic_history import History
 from .intrinsic_refinement import refine_all
 from .intrinsic_transfer import ConformingRefinement, level_lines, transfer_segments
@@ -508,12 +517,13 @@ def intrinsic_delaunay(
     True
     """
     mesh, refine = triangle_mesh(mesh), flag(refine, "refine")
-    if not isinstance(angle, Real) or not 0 < angle <= LARGEST_ANGLE:
-        raise GeometryError(f"angle must be between 0 and {LARGEST_ANGLE:g} degrees, not {angle!r}", element="angle")
-    if max_vertices is not None and not (isinstance(max_vertices, Real) and 0 < max_vertices < np.inf):
-        raise GeometryError(f"max_vertices must be positive and finite, not {max_vertices!r}", element="max_vertices")
-    if not isinstance(coarsest, Real) or not coarsest >= 1:
-        raise GeometryError(f"coarsest must be at least 1, not {coarsest!r}", element="coarsest")
+    angle = positive_number(angle, "angle", GeometryError)
+    if angle > LARGEST_ANGLE:
+        raise GeometryError(f"angle must be at most {LARGEST_ANGLE:g} degrees, not {angle:g}", element="angle")
+    if max_vertices is not None:
+        max_vertices = whole_number(max_vertices, "max_vertices", 1)
+    if not (isinstance(coarsest, float) and coarsest == np.inf):
+        coarsest = finite_number(coarsest, "coarsest", 1, GeometryError)
     stopwatch = Stopwatch(progress, steps=3)
     with stopwatch("embed curves"):
         base = mesh.intrinsic
@@ -529,8 +539,8 @@ def intrinsic_delaunay(
     with stopwatch("refine"):
         if refine:
             inner = within(progress, 2 / 3, 1.0)
-            limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else int(max_vertices)
-            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), float(coarsest), limit, inner)
+            limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else max_vertices
+            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), coarsest, limit, inner)
             marked = np.append(marked, False)[origin]
     n = int(gluing.counts[N_STEPS])
     triangles = lay_out(gluing)
