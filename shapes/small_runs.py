@@ -27,7 +27,7 @@ def runs() -> dict[str, np.ndarray]:
     found["grid"] = grid.values
     found["sharpened grid"] = sh.sharpen(grid).values
     few = samples.without_faces(samples.sphere(0), 0.2, 0)
-    with mock.patch.object(gauss, "LEVEL_POINTS", 500):
+    with mock.patch.object(gauss, "LEVEL_POINTS", 100):
         found["solid on a grid"] = sh.complete(few).field(resolution=5).values
     curve = ball.polyline([[1.0, 0.1, 0.2], [0.0, 1.0, -0.1], [-1.0, 0.0, 0.3]])
     surface = sh.SignedHeatSolver(ball).distance(curve)

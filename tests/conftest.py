@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -32,12 +35,27 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as shells leave it to w
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compile all kernels before workers begin, each of which would compile them; 3 s where all are compiled."""
+    """Compile all kernels before workers begin, each of which would compile them, unless this source's are compiled."""
     is_worker = hasattr(session.config, "workerinput")
-    if not is_worker and session.config.getoption("numprocesses", None):
-        done = subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
-        if done.returncode:  # it says why on standard error; what it could not compile, tests would report many times
-            pytest.exit(f"signedheat warmup failed with status {done.returncode}", returncode=1)
+    if is_worker or not session.config.getoption("numprocesses", None) or (stamp := _stamp()).exists():
+        return
+    done = subprocess.run([sys.executable, "-m", "signedheat", "warmup", "--quiet"], check=False)
+    if done.returncode:  # it says why on standard error; what it could not compile, tests would report many times
+        pytest.exit(f"signedheat warmup failed with status {done.returncode}", returncode=1)
+    with suppress(OSError):  # kernels are kept nowhere
+        stamp.touch()
+
+
+def _stamp() -> Path:
+    """Return a file beside the kernels, there once those of this source are compiled for this processor."""
+    import numba
+
+    from signedheat import compiled
+
+    digest = hashlib.sha256(repr((numba.__version__, compiled._processor())).encode())
+    for path in sorted(Path(compiled.__file__).parent.rglob("*.py")):
+        digest.update(path.read_bytes())
+    return compiled.cache_folder() / f"{digest.hexdigest()[:16]}.compiled"
 
 
 @pytest.fixture(autouse=True)

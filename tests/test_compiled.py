@@ -60,11 +60,19 @@ def test_a_number_written_in_a_kernel_needs_no_compilation_of_its_own():
 def test_compiling_is_announced_once_wherever_standard_error_goes(tmp_path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
     environment.pop("NUMBA_DISABLE_JIT", None)
-    code = """from signedheat import TriangleMesh
-mesh = TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-mesh.edges, mesh.places"""
+    (tmp_path / "own.py").write_text(
+        """from signedheat.compiled import compiled
+@compiled
+def one(x):
+    return x
+@compiled
+def two(x):
+    return one(x)
+one(1), two(2)"""
+    )
     for wanted in (1, 0):  # compiled, then read from the cache
-        done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+        command = [sys.executable, tmp_path / "own.py"]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         assert done.stderr.count("signedheat: compiling what this needs") == wanted and done.stdout == ""
 
 
