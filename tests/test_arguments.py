@@ -18,6 +18,7 @@ import signedheat as sh
 from public_names import PUBLIC, methods
 from refusals import refused
 from signedheat import batches, constraints, morphology, samples
+from signedheat.cli import main
 from signedheat.errors import GeometryError, SignedHeatError, UnsupportedTypeError
 from signedheat.methods import Convex, Extrapolated, Geodesic
 
@@ -287,25 +288,66 @@ GONE = """
 import os, sys, tempfile
 import signedheat as sh
 from signedheat import batches, samples
-ball = samples.sphere(1)
-ball.save(sys.argv[1])
+from signedheat.cli import main
+ball, kept = samples.sphere(1), sys.argv[1]
+ball.save(kept + "/a.stl")
+sh.read(kept + "/a.stl")  # imports Numba, which imports coverage where it is installed, which needs a current folder
+field, curve = sh.signed_distance(ball, resolution=8), ball.path([0, 9, 20])
 folder = tempfile.mkdtemp()
 os.chdir(folder)
 os.rmdir(folder)
-sh.read(sys.argv[1])
-for call in (
-    lambda: sh.read("a.stl"),
-    lambda: ball.save("a.stl"),
-    lambda: sh.complete(ball).field(20, band=0.1, store="tiles"),
-    lambda: batches.run("in", "out", batches.Job(volume=".npz", resolution=8)),
-):
+sh.read(kept + "/a.stl").save(kept + "/b.ply")
+assert main(["info", kept + "/a.stl", "--quiet"]) == 0
+assert main(["volume", kept + "/a.stl", "-o", kept + "/o.npz", "--resolution", "8", "--quiet"]) == 0
+job = batches.Job(volume=".npz", resolution=8)
+for name, call in {
+    "read": lambda: sh.read("a.stl"),
+    "read_field": lambda: sh.read_field("f.npz"),
+    "read_curves": lambda: sh.io.read_curves("c.json", ball),
+    "read_polylines": lambda: sh.io.read_polylines("l.svg"),
+    "read_labels": lambda: sh.io.read_labels("l.nrrd"),
+    "read_volume": lambda: sh.io.read_volume("v.npy"),
+    "save": lambda: ball.save("a.stl"),
+    "save field": lambda: field.save("f.npz"),
+    "save values": lambda: field.save("f.npy"),
+    "save solid": lambda: sh.complete(ball).save("a.npz"),
+    "write_curves": lambda: sh.io.write_curves(curve, "c.json", ball),
+    "write_vdb": lambda: sh.io.write_vdb(field, "f.vdb"),
+    "save_contour": lambda: field.save_contour("c.ply"),
+    "samples": lambda: sh.sample_distances(ball, 9).save("s.npz"),
+    "tiles": lambda: sh.complete(ball).field(20, band=0.1, store="tiles"),
+    "batch": lambda: batches.run("in", "out", job),
+    "batch of a folder": lambda: batches.run(".", kept + "/out", job),
+    "batch of a pattern": lambda: batches.run("*.stl", kept + "/out", job),
+    "batch to a folder": lambda: batches.run(kept + "/a.stl", "out", job),
+}.items():
     try:
         call()
+        print(name, "did it")
     except sh.errors.FileFormatError as error:
-        print("deleted" in error.cause and error.path is not None)
+        if "deleted" not in error.cause or error.path is None or not error.remedy:
+            print(name, error)
 """
+LINES_GONE = [
+    "info a.stl", "volume KEPT/a.stl -o o.npz", "volume a.stl -o KEPT/o.npz", "offset KEPT/a.stl 0.1 -o o.stl",
+    "batch KEPT/a.stl -o out --info", "batch . -o KEPT/out --info", "batch *.stl -o KEPT/out --info",
+    "view KEPT/a.stl -o p.png", "sample KEPT/a.stl -o s.npz", "surface KEPT/a.stl c.json -o KEPT/s.ply",
+    "section KEPT/a.stl -o s.svg", "union KEPT/a.stl KEPT/a.stl -o s.stl", "watertight KEPT/a.stl -o s",
+    "demo -o made", "volume KEPT/a.stl -o KEPT/o.npz --transform m.txt",
+]  # fmt: skip
 
 
 def test_a_working_folder_that_was_deleted_is_named(tmp_path):
-    done = subprocess.run([sys.executable, "-c", GONE, str(tmp_path / "a.stl")], capture_output=True, text=True)
-    assert done.stdout.split() == ["True"] * 4, done
+    done = subprocess.run([sys.executable, "-c", GONE, str(tmp_path)], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, ""), done
+
+
+@pytest.mark.parametrize("line", LINES_GONE)
+def test_commands_in_a_working_folder_that_was_deleted(tmp_path, line, monkeypatch, capfd):
+    BALL.save(tmp_path / "a.stl")
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert main([word.replace("KEPT", str(tmp_path)) for word in line.split()]) == 1
+    said = capfd.readouterr().err
+    assert "deleted" in said and said.count("\n") == 1

@@ -305,6 +305,16 @@ class InexactWarning(UserWarning):
     """
 
 
+def refuse_deleted_folder(path: str | os.PathLike[str]) -> None:
+    """Raise `FileFormatError` if a path is relative and the current folder has been deleted."""
+    try:
+        if not os.path.isabs(path):
+            os.getcwd()
+    except FileNotFoundError:
+        cause = "the folder that it is in, the current one, has been deleted"
+        raise FileFormatError(cause, remedy="change to another folder", path=path) from None
+
+
 def warn_user(message: str, category: type[Warning]) -> None:
     """Issue a warning attributed to the line of user code that called this package."""
     within = {__name__.partition(".")[0], "functools", "contextlib"}  # the last two call functions that they decorate

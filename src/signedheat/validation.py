@@ -6,7 +6,6 @@ A function here returns the converted value, or raises an error in which `name` 
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from collections.abc import Callable, Sequence
 from functools import wraps
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
-from .errors import FileFormatError, GeometryError, SignedHeatError, UnsupportedTypeError, counted, quoted
+from .errors import GeometryError, SignedHeatError, UnsupportedTypeError, counted, quoted
 from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -355,16 +354,6 @@ def used_bounds(points: Floats, ids: Ints) -> Floats:
     used = mask_of(len(points), ids.ravel())
     columns = (points if used.all() else points[used]).T
     return np.array([[column.min() for column in columns], [column.max() for column in columns]])
-
-
-def refuse_deleted_folder(path: str | os.PathLike[str]) -> None:
-    """Raise `FileFormatError` if a path is relative and the current folder has been deleted."""
-    try:
-        if not os.path.isabs(path):
-            os.getcwd()
-    except FileNotFoundError:
-        cause = "the folder that it is in, the current one, has been deleted"
-        raise FileFormatError(cause, remedy="change to another folder", path=path) from None
 
 
 P = ParamSpec("P")

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import FileFormatError
+from ..errors import FileFormatError, refuse_deleted_folder
 from ..io.files import extension
 from ..io.shape_files import READERS
 from ..io.urdf import meshes_of
@@ -79,10 +79,14 @@ def _name_in_robot(robot: Path, root: Path, mesh: Path, scale: tuple[float, floa
 
 
 def named_path(name: str | os.PathLike[str]) -> Path:
-    """Convert a name to a path; refuse an empty name, as of an unset shell variable, and one with a null character."""
+    """Convert a name to a path; refuse an empty one, as of an unset shell variable, and one of nothing that can exist.
+
+    That is a name with a null character, or a relative one in a folder that has been deleted.
+    """
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)
+    refuse_deleted_folder(name)
     return Path(name)
 
 

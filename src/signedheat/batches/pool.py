@@ -40,7 +40,7 @@ from ..packages import require
 from ..parallel import connected, n_threads
 from ..shapes.transforms import transform
 from ..solids.solid import Solid
-from ..validation import callback, positive_number, refuse_deleted_folder, whole_number
+from ..validation import callback, positive_number, whole_number
 from .inputs import UNSCALED, Input, expand, named_path
 from .job import Job
 from .manifest import Manifest, Outcome, State, source_of
@@ -395,7 +395,6 @@ def run(
         require("distributed", "clusters")
     workers, threads, time_limit = _checked_limits(workers, threads, time_limit)
     target = named_path(folder)
-    refuse_deleted_folder(target)
     if os.path.lexists(target) and not target.is_dir():
         raise FileFormatError("this is not a folder", remedy="choose another one", path=target)
     shapes = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)

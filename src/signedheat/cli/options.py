@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NoReturn, TypeAlias
 
 from .. import __version__
-from ..errors import LONGEST_QUOTE, FileFormatError, shortened
+from ..errors import LONGEST_QUOTE, FileFormatError, refuse_deleted_folder, shortened
 from ..jobs import MOST_THREADS
 from .terminal import say, write_out
 
@@ -216,9 +216,15 @@ INPUT_ARGUMENTS = ("shape", "mesh", "field", "file", "files", "inputs", "curves"
 
 def refuse_output_over_input(arguments: Namespace) -> None:
     """Raise `FileFormatError` if an output file is also an input."""
-    for written in _names(getattr(arguments, "output", None)):
-        for read in (name for argument in INPUT_ARGUMENTS for name in _names(getattr(arguments, argument, None))):
-            if written != "-" and os.path.realpath(written) == os.path.realpath(read) and not os.path.isdir(read):
+    inputs, outputs = (
+        [name for argument in listed for name in _names(getattr(arguments, argument, None)) if name != "-"]
+        for listed in (INPUT_ARGUMENTS, ("output",))
+    )
+    for name in inputs + outputs:
+        refuse_deleted_folder(name)
+    for written in outputs:
+        for read in inputs:
+            if os.path.realpath(written) == os.path.realpath(read) and not os.path.isdir(read):
                 raise FileFormatError("the output would replace the input", remedy="name another file", path=written)
 
 
@@ -234,7 +240,7 @@ def refuse_unused_formats(arguments: Namespace) -> None:
 def _names(value: Any) -> list[str]:
     """Return those strings in the value of an argument, a string or a list, that can be names of files."""
     values = value if isinstance(value, list) else [value]
-    return [name for name in values if isinstance(name, str) and "\0" not in name]
+    return [name for name in values if isinstance(name, str) and name and "\0" not in name]
 
 
 def output(help: str, metavar: str = "OUT") -> Option:

@@ -20,8 +20,7 @@ from typing import BinaryIO, TypeVar
 
 import numpy as np
 
-from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, UnsupportedTypeError
-from ..validation import refuse_deleted_folder
+from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, UnsupportedTypeError, refuse_deleted_folder
 from .budgets import account, charge
 
 PathLike = str | os.PathLike[str]
@@ -101,6 +100,8 @@ def reading(path: PathLike) -> Iterator[None]:
     except Exception as error:  # damaged files make parsers raise exceptions of any type
         if _is_ours(error):
             raise
+        if isinstance(error, FileNotFoundError):  # a package that is imported now may look for the current folder
+            refuse_deleted_folder(os.curdir)
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileFormatError(
             f"it is damaged or of another kind ({reason:.200})", remedy="write or download it again", path=path

@@ -26,7 +26,14 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, fingerprint
 from ..diagnostics import Diagnostics, Note
-from ..errors import FileFormatError, MemoryLimitError, OutsideError, SignedHeatError, UnsupportedTypeError
+from ..errors import (
+    FileFormatError,
+    MemoryLimitError,
+    OutsideError,
+    SignedHeatError,
+    UnsupportedTypeError,
+    refuse_deleted_folder,
+)
 from ..fields.field import Field
 from ..fields.solid_queries import SolidQueries
 from ..grids.band import Band
@@ -40,7 +47,7 @@ from ..packages import lazy_module
 from ..parallel import connected, in_threads, n_threads
 from ..search.face_tree import FaceTree, feet_on
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import positive_number, refuse_deleted_folder
+from ..validation import positive_number
 from .winding import Windings
 
 TILE = 8
