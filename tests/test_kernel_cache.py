@@ -6,6 +6,7 @@ import importlib
 import os
 import pty
 import re
+import shutil
 import subprocess
 import sys
 import textwrap
@@ -163,17 +164,25 @@ def test_no_folder_can_be_written(tmp_path, shifted, monkeypatch):
     assert not list(tmp_path.rglob("*.nbc"))
 
 
-@pytest.fixture
-def carried(tmp_path, monkeypatch):
-    """The folder of kernels as a wheel carries them."""
+@pytest.fixture(scope="module")
+def compiled_for_wheels(tmp_path_factory):
+    """A folder with both files and, in `wheel`, their kernels, compiled once as for wheels."""
     if compiled._kind_of_code() is None:
         pytest.skip("this processor does not run what wheels carry, or other code is asked for")
-    (tmp_path / "scaling.py").write_text(SCALING.format(factor=2.0))
-    (tmp_path / "shifting.py").write_text(SHIFTING.format(shift=1.0))
+    folder = tmp_path_factory.mktemp("built")
+    (folder / "scaling.py").write_text(SCALING.format(factor=2.0))
+    (folder / "shifting.py").write_text(SHIFTING.format(shift=1.0))
     baseline = {"NUMBA_CPU_NAME": compiled.BASELINE, "NUMBA_CPU_FEATURES": ""}
-    environment = {**os.environ, **baseline, "NUMBA_CACHE_DIR": str(tmp_path / "wheel")}
+    environment = {**os.environ, **baseline, "NUMBA_CACHE_DIR": str(folder / "wheel")}
     command = [sys.executable, "-c", "import shifting; shifting.shifted(3.0)"]
-    subprocess.run(command, cwd=tmp_path, env=environment, check=True)
+    subprocess.run(command, cwd=folder, env=environment, check=True)
+    return folder
+
+
+@pytest.fixture
+def carried(compiled_for_wheels, tmp_path, monkeypatch):
+    """The folder of kernels as a wheel carries them, for the test alone."""
+    shutil.copytree(compiled_for_wheels, tmp_path, dirs_exist_ok=True)
     monkeypatch.setattr(compiled, "CARRIED", tmp_path / "wheel" / "signedheat")
     return compiled.CARRIED
 

@@ -160,7 +160,7 @@ def test_small_parts_are_named_and_left_out(tmp_path, capsys):
 @pytest.mark.usefixtures("in_this_process")
 def test_openings_are_sealed(tmp_path, capsys):
     """A ball with two skins and a hole in both is one body."""
-    skins = samples.union(samples.sphere(4), samples.sphere(4, radius=0.9))
+    skins = samples.union(samples.sphere(3), samples.sphere(3, radius=0.9))
     centres = skins.vertices[skins.faces].mean(axis=1)
     sh.TriangleMesh(skins.vertices, skins.faces[centres[:, 2] < 0.88]).save(tmp_path / "skins.ply")
     command = ["watertight", str(tmp_path / "skins.ply"), "-o", str(tmp_path / "solid.ply"), "--workers", "1"]
