@@ -89,6 +89,14 @@ def forked_parsers() -> Iterator[None]:
 
 
 @pytest.fixture
+def coarse_duck(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The duck of the samples has a fifth of its faces, for tests in which it is any broken shape."""
+    from signedheat import samples  # imports NumPy, which must know the number of threads
+
+    monkeypatch.setattr(samples.duck, "__defaults__", (24,))
+
+
+@pytest.fixture
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures have a tenth of their pixels, which take as long as what they show."""
     from matplotlib.figure import Figure

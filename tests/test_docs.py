@@ -60,7 +60,7 @@ def test_every_public_name_is_in_the_reference():
     assert len(listed) == len(set(listed))
 
 
-@pytest.mark.usefixtures("small_pictures")
+@pytest.mark.usefixtures("small_pictures", "coarse_duck")
 @pytest.mark.parametrize("name", ["quickstart", "tutorial", "recipes", "domains"])
 def test_code_of_pages_runs_from_top_to_bottom(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

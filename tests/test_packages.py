@@ -84,6 +84,7 @@ def test_pictures_are_refused_before_anything_is_computed(monkeypatch, folder, c
     assert not (folder / "phi.npz").exists()
 
 
+@pytest.mark.usefixtures("coarse_duck")
 def test_the_demo_without_pictures_makes_the_rest(monkeypatch, tmp_path, capsys):
     block(monkeypatch, "matplotlib")
     assert main(["demo", "-o", str(tmp_path), "--resolution", "12"]) == 0

@@ -261,6 +261,7 @@ def test_pictures(tmp_path, ball, capsys):
 
 
 @pytest.mark.usefixtures("small_pictures")
+@pytest.mark.usefixtures("coarse_duck", "small_pictures")
 def test_demo_needs_no_file(tmp_path, capsys):
     assert main(["demo", "-o", str(tmp_path / "demo"), "--resolution", "24", "--json"]) == 0
     out, err = capsys.readouterr()
