@@ -128,6 +128,36 @@ def test_bodies_far_apart_do_not_know_of_each_other(distance):
     assert len(solid.triangles) == len(first[1]) + len(second[1]) and near.volume == pytest.approx(own)
 
 
+BESIDE = {
+    "a triangle": (np.eye(3), np.arange(3)[None]),
+    "an open box": box((0, 0, 0), (1, 1, 1), without=[1]),
+    "loose triangles": (lambda soup: (np.array(soup.vertices), np.array(soup.faces)))(
+        samples.soup(samples.sphere(2), 0.02, 1)
+    ),
+}
+
+
+@pytest.mark.parametrize("beside", BESIDE)
+@pytest.mark.parametrize("size", [0.01, 100.0])
+def test_loose_triangles_do_not_know_of_what_is_far_away(beside, size):
+    points = 0.8 * np.random.default_rng(0).normal(size=(200, 3))
+    soup = samples.soup(samples.sphere(2), 0.03, 0)
+    vertices, faces = BESIDE[beside]
+    together = joined((soup.vertices, soup.faces), (size * vertices + [10 * (size + 1), 0, 0], faces))
+    alone, both = sh.complete(soup).distance(points), sh.complete(together).distance(points)
+    np.testing.assert_allclose(both, alone, atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [0.01, 1.0, 100.0])
+def test_open_bodies_do_not_know_of_loose_triangles_far_away(size):
+    points = 0.8 * np.random.default_rng(0).normal(size=(200, 3)) + 0.5
+    vertices, faces = BESIDE["loose triangles"]
+    bodies = joined(BESIDE["an open box"], box((0.25, 0.25, 1.5), (0.75, 0.75, 2), without=[0]))
+    together = joined(bodies, (size * vertices + [10 * (size + 1), 0, 0], faces))
+    alone, both = sh.complete(bodies).distance(points), sh.complete(together).distance(points)
+    np.testing.assert_allclose(both, alone, atol=1e-9)
+
+
 @pytest.mark.parametrize("reach", [1e3, 1e7, 1e10])
 def test_a_face_that_reaches_far_away_changes_nothing_near_by(reach):
     vertices, faces = ball(2)

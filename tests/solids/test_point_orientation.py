@@ -6,7 +6,7 @@ import pytest
 import signedheat as sh
 from refusals import refused
 from signedheat import samples
-from signedheat.solids.gauss import Pieces, system_of, without_slender
+from signedheat.solids.gauss import Dipoles, Pieces, without_slender
 from signedheat.solids.point_orientation import orient_points
 from signedheat.surfaces.normal_orientation import outward_normals
 
@@ -168,7 +168,7 @@ def test_too_few_points_and_points_in_the_plane_are_refused():
 def orient_triangles(corners):
     """Signs of loose triangles by Gauss's formula."""
     return np.where(
-        system_of(Pieces(corners, np.arange(len(corners)))).weights(np.zeros(len(corners), dtype=bool)) >= 0, 1.0, -1.0
+        Dipoles.of_triangles(Pieces(corners, np.arange(len(corners)))).weights(np.zeros(len(corners), dtype=bool)) >= 0, 1.0, -1.0
     )
 
 
@@ -213,8 +213,8 @@ def test_a_system_of_some_pieces_is_near_that_made_of_them_alone():
     corners = samples.soup(samples.torus(), 0.002).vertices.reshape(-1, 3, 3)
     kept = np.random.default_rng(1).random(len(corners)) < 0.9
     none = np.zeros(kept.sum(), dtype=bool)
-    restricted = system_of(Pieces(corners, np.arange(len(corners)))).chosen(kept).weights(none)
-    alone = system_of(Pieces(corners[kept], np.arange(kept.sum()))).weights(none)
+    restricted = Dipoles.of_triangles(Pieces(corners, np.arange(len(corners)))).chosen(kept).weights(none)
+    alone = Dipoles.of_triangles(Pieces(corners[kept], np.arange(kept.sum()))).weights(none)
     assert (restricted > 0).all()
     assert np.abs(restricted - alone).mean() < 0.1
 

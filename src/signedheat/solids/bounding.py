@@ -6,12 +6,13 @@ The shape is read as it was given first. Each connected part that this leaves un
 Closed pieces are kept whole, and flipped as a whole to face outwards. Within another body each keeps the orientation
 it was given relative to that body. All other pieces are open. Gauss's formula (`gauss`) decides for all of them
 together which of them bound something, and which way they face if that is not given. It takes bodies that overlap into
-account (`overlaps`).
+account (`overlaps`). Where many loose triangles are near each other, it decides about these last.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from ..mesh.triangles import cone_volumes
 from ..parallel import PointTree
 from ..search.winding_tree import WindingTree
 from .chain import Chain
-from .gauss import Matrix, Pieces, means, sampled, system_of, without_slender
+from .gauss import Dipoles, Matrix, Pieces, are_soups, means, sampled, without_slender
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces
 from .readings import Reading, as_given, mixed, once, unexplained
 from .rims import meeting_edges, open_edges
@@ -43,6 +44,8 @@ ball that has lost 85 % of its faces 0.95."""
 PARTLY_INSIDE = 0.25
 """Loose pieces lie along closed ones, as noisy copies do, if the mean winding number of these there differs from whole
 numbers by more than this."""
+MOST_EXACT = 3000
+"""Largest number of pieces with exact solid angles, since their matrix must be solved."""
 GAP_REACH = 1.5
 """Largest distance between faces of two pieces that belong together, relative to the size of the smaller piece."""
 
@@ -265,10 +268,12 @@ def _decided(
             np.sign(counts[open_faces] * chain.multiplicities[open_faces]) * chain.areas[open_faces], labels, len(names)
         )
         fixed_pieces = np.bincount(labels, fixed[open_faces]) > 0
-        signs, bounds[names], loose[names], levels[names], overlapping = open_bounding(
-            Pieces(triangles, labels), groups, rims, given, around, fixed_pieces, nested, united
+        parts = Pieces(triangles, labels)
+        found = open_bounding(
+            OpenPieces(parts, clusters_of(parts), groups, rims, given, fixed_pieces), around, nested, united
         )
-        flips[names] = np.where(bounds[names], signs, 1.0)
+        bounds[names], loose[names], levels[names], overlapping = found.bounds, found.loose, found.levels, found.overlap
+        flips[names] = np.where(bounds[names], found.signs, 1.0)
     bodies = inwards = 0
     if closed.any() and not as_oriented:
         flips, bodies, inwards = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
@@ -342,31 +347,74 @@ def _nested(
     return signs, int((inner & (facing > 0)).sum()), int((inner & (facing < 0)).sum())
 
 
-def open_bounding(
-    pieces: Pieces,
-    groups: Ints,
-    rims: Rims,
-    given: Floats,
-    closed: Floats,
-    fixed: Bools,
-    nested: Nesting = "given",
-    united: bool = True,
-) -> tuple[Floats, Bools, Ints, Floats, bool]:
+class OpenPieces(NamedTuple):
+    """Open pieces that are decided about together."""
+
+    pieces: Pieces
+    clusters: Ints  # (p,) cluster of pieces that are near each other (`clusters_of`)
+    groups: Ints  # (p,) connected group of each
+    rims: Rims  # their boundary edges
+    given: Floats  # (p,) area of each that faces as given, less the rest
+    fixed: Bools  # (p,) which are not flipped
+
+    def chosen(self, kept: Bools) -> OpenPieces:
+        """Restrict to some of the pieces, (p,) bool; these, their clusters and their groups are renumbered in order."""
+        (triangles, labels), (middles, lengths, owners) = (self.pieces.triangles, self.pieces.labels), self.rims
+        rows, edges, number = kept[labels], kept[owners], np.cumsum(kept) - 1
+        clusters, groups = (np.unique(names[kept], return_inverse=True)[1] for names in (self.clusters, self.groups))
+        pieces, rims = Pieces(triangles[rows], number[labels[rows]]), (middles[edges], lengths[edges])
+        return OpenPieces(
+            pieces, clusters, groups, Rims(*rims, number[owners[edges]]), self.given[kept], self.fixed[kept]
+        )
+
+
+class OpenBounding(NamedTuple):
+    """Decision which open pieces bound something, and which way they face."""
+
+    signs: Floats  # (p,) −1 for pieces to be flipped, 1 for others
+    bounds: Bools  # (p,) which bound something
+    # (p,) cluster of each, where it consists mostly of loose pieces: neither they nor their groups are bodies; else −1
+    loose: Ints
+    levels: Floats  # (p,) mean level of that cluster; ½ for all others
+    overlap: bool  # whether there are bodies that ignore others
+
+
+def open_bounding(given: OpenPieces, closed: Floats, nested: Nesting = "given", united: bool = True) -> OpenBounding:
     """Orient open pieces, and decide which of them bound something.
 
-    Return, (p,) each, signs, whether pieces bound something, clusters of those that are loose or −1, and levels; and
-    whether there are bodies that ignore others. A piece is loose if neither it nor its group is a body by itself.
-
-    `groups` are (p,) connected groups of pieces, and `given` the (p,) area of each that faces as given, less the rest.
-    `rims` are the boundary edges of pieces. `nested` decides which bodies within others are cavities, and `united`
-    whether bodies that overlap ignore each other. Pieces that are `fixed`, (p,), have the sign 1. `closed` are
-    (k, 3, 3) triangles of closed pieces. In each round, pieces whose level is too low are left out if they leave at
-    least half as much unexplained as the worst one.
+    `closed` are (k, 3, 3) triangles of closed pieces. `nested` decides which bodies within others are cavities, and
+    `united` whether bodies that overlap ignore each other. Clusters of many loose triangles are decided about last,
+    since they tell nothing that is exact about others.
     """
+    soups = are_soups(given.pieces, given.clusters)
+    if soups.all() or not soups.any():
+        return _open_bounding(given, soups.any(), closed, nested, united)
+    signs, bounds = np.ones(len(soups)), np.zeros(len(soups), dtype=bool)
+    loose, levels, overlap = np.full(len(soups), -1), np.full(len(soups), 0.5), False
+    for is_soup in (False, True):
+        kept = soups == is_soup
+        part = given.chosen(kept)
+        found = _open_bounding(part, is_soup, closed, nested, united)
+        signs[kept], bounds[kept], levels[kept] = found.signs, found.bounds, found.levels
+        firsts = given.clusters[kept][first_members(part.clusters, int(part.clusters.max()) + 1)]
+        loose[kept] = np.where(found.loose >= 0, firsts[found.loose], -1)
+        overlap |= found.overlap
+        rows = np.where(found.bounds, found.signs, 0.0)[part.pieces.labels]
+        closed = np.concatenate([closed, directed(part.pieces.triangles, rows)])
+    return OpenBounding(signs, bounds, loose, levels, overlap)
+
+
+def _open_bounding(open_pieces: OpenPieces, soup: bool, closed: Floats, nested: Nesting, united: bool) -> OpenBounding:
+    """Decide about open pieces as `open_bounding` does; each triangle is a dipole if they are a `soup`, or too many.
+
+    In each round, pieces whose level is too low are left out if they leave at least half as much unexplained as the
+    worst one.
+    """
+    pieces, clusters, groups, rims, given, fixed = open_pieces
     n, areas = len(pieces.areas), pieces.areas
     shared = np.bincount(groups, minlength=n)[groups] > 1
     alone = np.abs(levels_of_pieces(pieces))
-    clusters, whole = clusters_of(pieces), system_of(pieces)
+    whole = Dipoles.of_triangles(pieces) if soup or n > MOST_EXACT else Matrix.of(pieces)
     members = _effective_counts(areas, np.arange(n), groups)[groups]
     overlapping = False
     alive, weights = np.ones(n, dtype=bool), np.ones(n)  # the signs of the weights are those of the pieces
@@ -412,7 +460,7 @@ def open_bounding(
     of_loose, of_bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
     mostly = alive & (of_loose > of_bodies)[clusters]
     levels = np.where(mostly, mean[clusters], 0.5)
-    return signs_of(weights), alive, np.where(mostly, clusters, -1), levels, overlapping
+    return OpenBounding(signs_of(weights), alive, np.where(mostly, clusters, -1), levels, overlapping)
 
 
 def _is_body(mean: Floats, square: Floats, pieces: Floats) -> Bools:

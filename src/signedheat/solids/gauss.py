@@ -47,7 +47,8 @@ PLANE_NEIGHBORS = 12
 LEVEL_POINTS = 10_000
 """Largest number of points at which the level is sampled, besides one on each piece."""
 LOOSE_DIPOLES = 64
-"""More loose triangles than this become dipoles; fewer get exact solid angles, by which noise is recognized."""
+"""More loose triangles than this near each other become dipoles; fewer get exact solid angles, by which noise is
+recognized."""
 TREE_FACES = 256
 """The solid angles of a piece with more faces than this are summed by a tree; those of others one by one."""
 PIECE_RADII, NODE_RADII = 4.0, 2.0
@@ -82,12 +83,11 @@ class Pieces(Frozen):
         return np.bincount(self.labels, self.face_areas).astype(np.float64)
 
 
-def system_of(pieces: Pieces) -> Matrix | Dipoles:
-    """Make the map W of k pieces: by dipoles for many loose triangles, or else by exact solid angles."""
-    sizes, areas = np.bincount(pieces.labels), pieces.areas
-    many = areas.sum() ** 2 > LOOSE_DIPOLES * (areas**2).sum() and areas[sizes == 1].sum() > 0.5 * areas.sum()
-    # with many pieces each face becomes a dipole, and a tree replaces the matrix W
-    return Dipoles.of_triangles(pieces) if many or len(areas) > 3000 else Matrix.of(pieces)
+def are_soups(pieces: Pieces, clusters: Ints) -> Bools:
+    """(k,) whether pieces are in clusters, (k,), that consist mostly of many loose triangles."""
+    single, areas = np.bincount(pieces.labels) == 1, pieces.areas
+    whole, squares, loose = (np.bincount(clusters, values) for values in (areas, areas**2, areas * single))
+    return np.asarray((whole**2 > LOOSE_DIPOLES * squares) & (loose > 0.5 * whole))[clusters]
 
 
 def means(values: Floats, groups: Ints, weights: Floats, n: int) -> Floats:
@@ -358,7 +358,15 @@ class Dipoles:
         inverse = 1.0 / np.maximum(sums_of(laplacian.diagonal() + damping, unknowns, n), np.finfo(float).tiny)
         right_side = sums_of(self._adjoint((0.5 + self.within) * shares), unknowns, n)
         first_guess = None if start is None else start[first_members(unknowns, n)]
-        weights = conjugate_gradients(system, right_side, lambda rest: inverse * rest, first_guess, WEIGHT_TOLERANCE)
+        goal = WEIGHT_TOLERANCE * np.linalg.norm(inverse * right_side)  # pieces count alike, however large others are
+        weights = conjugate_gradients(
+            system,
+            right_side,
+            lambda rest: inverse * rest,
+            first_guess,
+            tolerance=0.0,
+            converged=lambda _, rest: bool(np.linalg.norm(inverse * rest) <= goal),
+        )
         return as_fixed(weights, unknowns, fixed)
 
     def levels(self, signs: Floats) -> Floats:
