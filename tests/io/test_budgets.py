@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import gzip
 import json
+import operator
 import re
 import time
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -170,26 +173,38 @@ def test_messages_quote_no_more_than_a_line(tmp_path):
 
 
 SOURCE = Path(sh.__file__).parent
-PATTERN = re.compile(
-    r're\.(compile|findall|finditer|fullmatch|match|search|split|sub)\(\s*(rb?|br)(["\'])(.*?)(?<!\\)\3'
-)
+FINDING = {"sub": "findall", "split": "findall", "finditer": "findall"}
+"""Functions that go through a text as others do."""
 
 
 def patterns():
-    """All regular expressions of the package, and how they are used; those with a name are matched from a place on."""
-    used = {(m[4], m[1]) for file in SOURCE.rglob("*.py") for m in PATTERN.finditer(file.read_text())}
-    assert len(used) > 5
-    ways = {"compile": ("match", "fullmatch"), "sub": ("findall",), "split": ("findall",), "finditer": ("findall",)}
-    return sorted((pattern, way) for pattern, use in used for way in ways.get(use, (use,)))
+    """All regular expressions of the package, their flags, and how they are used, by their names or at once."""
+    texts = [file.read_text() for file in SOURCE.rglob("*.py")]
+    source, used = "\n".join(texts), set()
+    for tree in map(ast.parse, texts):
+        named = {id(node.value): node.targets[0].id for node in ast.walk(tree) if isinstance(node, ast.Assign)
+                 and isinstance(node.targets[0], ast.Name)}  # fmt: skip
+        for node in ast.walk(tree):
+            match node:
+                case ast.Call(ast.Attribute(ast.Name("re"), way), [ast.Constant(pattern), *rest], keywords):
+                    listed = [*rest, *(keyword.value for keyword in keywords)]
+                    flags = [getattr(re, flag.attr) for flag in listed if isinstance(flag, ast.Attribute)]
+                    name = named.get(id(node), "")
+                    ways = re.findall(rf"\b{name}\.(match|fullmatch|search|sub|findall|finditer|split)\b", source)
+                    for use in ways if way == "compile" and name else ["fullmatch"] if way == "compile" else [way]:
+                        used.add((pattern, reduce(operator.or_, flags, re.RegexFlag(0)), FINDING.get(use, use)))
+    assert len({pattern for pattern, _, _ in used}) > 15
+    return sorted(used, key=str)
 
 
-@pytest.mark.parametrize(("pattern", "way"), patterns())
-def test_regular_expressions_are_linear(pattern, way):
+@pytest.mark.parametrize(("pattern", "flags", "way"), patterns())
+def test_regular_expressions_are_linear(pattern, flags, way):
     """On whatever repeats and then ends in what does not match."""
-    n = 10_000
-    words = {*re.findall(r"[A-Za-z-]{3,}", pattern), " ", "1", "a", "1,", "1.", "-", "(", "\\ ", "\n", "1e", "$a"}
+    n, is_text = 30_000, isinstance(pattern, str)
+    words = {*re.findall("[A-Za-z-]{3,}", pattern if is_text else pattern.decode())}
+    words |= {" ", "1", "a", "1,", "1.", "-", "(", "\\ ", "\n", "1e", "$a", "1/", '"', "_", "+.", "１"}
     begin = time.process_time()
     for word in sorted(words):
         for text in (word * n, (word + " ") * n, word + " " * n, word * n + "\0", word + "1" * n + "x", word + "(" * n):
-            getattr(re, way)(pattern, text)
+            getattr(re, way)(pattern, text if is_text else text.encode(), flags)
     assert time.process_time() - begin < SECONDS
