@@ -53,6 +53,8 @@ BASELINE_FEATURES = "avx", "avx2", "bmi", "bmi2", "cx16", "f16c", "fma", "lzcnt"
 """LLVM's names for the features of level 3, without those that AVX implies."""
 CARRIED = Path(__file__).parent / "kernels"
 """Folder of the kernels that a wheel carries, which `make wheel` fills."""
+OWN_FOLDER = "signedheat-{}-"
+"""Beginning of the name of the temporary folder of a process, with its id, for kernels that can be kept nowhere."""
 _names: dict[Callable[..., Any], str] = {}
 """Cache folder of each function whose dispatcher is being made (`kept_as`)."""
 _lock = RLock()
@@ -241,8 +243,14 @@ def _folder_beside_the_source() -> Path:
 
 @cache
 def _folder_of_this_process() -> tempfile.TemporaryDirectory[str]:
-    """Make a temporary folder that is removed when the process ends."""
-    return tempfile.TemporaryDirectory(prefix="signedheat-")
+    """Make a temporary folder that is removed when the process ends, unless it is killed."""
+    return tempfile.TemporaryDirectory(prefix=OWN_FOLDER.format(os.getpid()))
+
+
+def remove_folders_of(process: int) -> None:
+    """Remove the temporary folder of a process, given by its id, that was killed."""
+    for folder in Path(tempfile.gettempdir()).glob(OWN_FOLDER.format(process) + "*"):
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 @cache

@@ -58,6 +58,8 @@ def test_whatever_happens_to_one_the_others_are_done(tmp_path, files):
     }
     assert sorted(reports) == names
     assert {each.name for each in batch.failures} == {"bug", "crashed", "killed", "slow", "wrong"}
+    own = (folder / "killed.own").read_text()  # the folder that it had for kernels
+    assert "signedheat-" in own and not os.path.lexists(own)
     told = {line["name"]: line for line in lines(tmp_path / "out")}
     assert list(told) == names
     assert told["wrong"]["message"] == "there is no face: add one"

@@ -32,6 +32,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from ..compiled import remove_folders_of
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, counted, printable
 from ..io.files import move_into_place, replaceable, writing
 from ..io.shape_files import read, save
@@ -202,6 +203,7 @@ class Worker:
             process.wait(1.0)  # it may still be exiting
         process.kill()
         process.communicate()
+        remove_folders_of(process.pid)
         with self._errors:
             self._errors.seek(0)
             lines = self._errors.read().decode("utf-8", errors="replace").splitlines()
