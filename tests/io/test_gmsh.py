@@ -116,3 +116,14 @@ def test_no_part_of_a_volume_is_left_out(tmp_path, others):
     meshio.Mesh(points, cells).write(tmp_path / "mixed.vtu")
     with refused(sh.errors.GeometryError, file="mixed.vtu"):
         sh.read(tmp_path / "mixed.vtu")
+
+
+@pytest.mark.parametrize("version", ["4.1", "4.0", "2.2"])
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("node", [-1, -2, len(BOX.vertices), len(BOX.vertices) + 1])
+def test_nodes_that_do_not_exist_are_not_the_last_ones(tmp_path, capsys, version, binary, node):
+    tets = np.concatenate([BOX.tets, [[0, 1, 2, node]]])
+    mesh = meshio.Mesh(BOX.vertices, [("tetra", tets)])
+    meshio.gmsh.write(str(tmp_path / "box.msh"), mesh, fmt_version=version, binary=binary)
+    with refused(sh.errors.SignedHeatError, file="box.msh"):
+        sh.read(tmp_path / "box.msh")

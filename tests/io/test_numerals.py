@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import struct
 import zipfile
 from pathlib import Path
 
@@ -84,7 +85,11 @@ def gltf(path, index, old):
     }
     text = json.dumps(tree)
     assert old in text
-    path.write_text(text.replace(old, f"{old.rpartition(' ')[0]} {index}{']' * old.count(']')}", 1))
+    data = text.replace(old, f"{old.rpartition(' ')[0]} {index}{']' * old.count(']')}", 1).encode()
+    if path.suffix == ".glb":
+        data += b" " * (-len(data) % 4)
+        data = b"glTF" + struct.pack("<IIII", 2, 20 + len(data), len(data), 0x4E4F534A) + data
+    path.write_bytes(data)
 
 
 GLTF = [
@@ -95,16 +100,18 @@ GLTF = [
 
 @pytest.mark.parametrize("old", GLTF)
 @pytest.mark.parametrize("index", ["-1", "1.7", "240.9", "true", '"1_0"', "1e99", "null", "[0]"])
-def test_gltf(tmp_path, old, index):
-    gltf(tmp_path / "a.gltf", index, old)
-    with refused(SignedHeatError, file="a.gltf"):
-        sh.read(tmp_path / "a.gltf")
+@pytest.mark.parametrize("name", ["a.gltf", "a.glb"])
+def test_gltf(tmp_path, old, index, name):
+    gltf(tmp_path / name, index, old)
+    with refused(SignedHeatError, file=name):
+        sh.read(tmp_path / name)
 
 
 @pytest.mark.parametrize("old", GLTF)
-def test_gltf_integers_may_be_written_with_a_point(tmp_path, old):
-    gltf(tmp_path / "a.gltf", old.rpartition(" ")[2] + ".0", old)
-    assert sh.read(tmp_path / "a.gltf").n_faces == 1
+@pytest.mark.parametrize("name", ["a.gltf", "a.glb"])
+def test_gltf_integers_may_be_written_with_a_point(tmp_path, old, name):
+    gltf(tmp_path / name, old.rpartition(" ")[2] + ".0", old)
+    assert sh.read(tmp_path / name).n_faces == 1
 
 
 # In these files, ⟦…⟧ surrounds counts and ids, which are integers and not negative, and ⟨…⟩ finite real numbers.

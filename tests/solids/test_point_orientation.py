@@ -168,7 +168,9 @@ def test_too_few_points_and_points_in_the_plane_are_refused():
 def orient_triangles(corners):
     """Signs of loose triangles by Gauss's formula."""
     return np.where(
-        Dipoles.of_triangles(Pieces(corners, np.arange(len(corners)))).weights(np.zeros(len(corners), dtype=bool)) >= 0, 1.0, -1.0
+        Dipoles.of_triangles(Pieces(corners, np.arange(len(corners)))).weights(np.zeros(len(corners), dtype=bool)) >= 0,
+        1.0,
+        -1.0,
     )
 
 

@@ -128,12 +128,34 @@ def cells(path: str, module: str) -> dict[str, Any]:
     """
     from importlib import import_module
 
+    if module == "gmsh":
+        refuse_nodes_before_the_first()
     mesh = import_module(f"meshio.{module}").read(path)
     values = {name: np.asarray(column) for name, column in mesh.point_data.items()}
     values = {name: column for name, column in values.items() if column.dtype.kind in "biuf"}
     result = {"points": np.asarray(mesh.points, dtype=np.float64), "kinds": [block.type for block in mesh.cells]}
     result |= {f"cells {k}": np.asarray(block.data) for k, block in enumerate(mesh.cells)}
     return result | {"names": list(values)} | {f"values {k}": column for k, column in enumerate(values.values())}
+
+
+def refuse_nodes_before_the_first() -> None:
+    """Make meshio map nodes 0 and −1 of elements in Gmsh files to nodes that do not exist, not to the last ones."""
+    from importlib import import_module
+
+    def guarded(read: Any, position: int) -> Any:
+        """Return a function that reads elements after two ids have been added to those of the nodes."""
+
+        def read_elements(*arguments: Any) -> Any:
+            tags = np.asarray(arguments[position])
+            more = np.append(tags, tags.max() + np.array([1, 2]))  # Python counts −1 and −2 from the end
+            return read(*arguments[:position], more, *arguments[position + 1 :])
+
+        return read_elements
+
+    for version, name, position in ((22, "_read_cells", 2), (40, "_read_elements", 1), (41, "_read_elements", 1)):
+        with contextlib.suppress(ImportError, AttributeError):  # other versions of meshio may name them otherwise
+            reader = import_module(f"meshio.gmsh._gmsh{version}")
+            setattr(reader, name, guarded(getattr(reader, name), position))
 
 
 def nifti(path: str) -> dict[str, Any]:
