@@ -46,7 +46,7 @@ def test_it_is_nearly_the_distance_of_the_whole_mesh(arcs, parts_used, monkeypat
     mesh = plate(40)
     curves = [mesh.polyline(arc(6.3, *ends)) for ends in arcs]
     nearby = sh.signed_distance(curves, mesh).values
-    monkeypatch.setattr(surroundings, "LARGEST_SHARE", 0.0)
+    monkeypatch.setattr(surroundings, "REACH", np.inf)
     whole = sh.signed_distance(curves, mesh).values
     assert parts_used[0] is not None and parts_used[1] is None
     assert parts_used[0].part.n_faces < mesh.n_faces / 4

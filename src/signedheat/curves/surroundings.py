@@ -20,9 +20,6 @@ REACH = 1.0
 """Distance from the curves to the border of their surroundings, relative to the extent of the curves. Against a mesh
 taken whole, distance to circles in one to six arcs changes by at most 0.8 % of the extent, a finer mesh changes it by
 as much. Halved it is 1.5 %, doubled 0.5 %."""
-LARGEST_SHARE = 0.25
-"""Share of the faces above which the surroundings are the whole mesh, as too little time would be saved. An answer may
-change by as much as `REACH` allows where something added far away makes the share smaller than this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +33,7 @@ class Surroundings:
 
     @classmethod
     def of(cls, whole: TriangleMesh, segments: Sequence[CurveSegments]) -> Surroundings | None:
-        """Return the surroundings of segments on a mesh; None if they are most of it, or there are no segments."""
+        """Return the surroundings of segments on a mesh; None if they are all of it, or there are no segments."""
         crossed = np.concatenate([np.concatenate([part.nodes.faces, part.faces]) for part in segments])
         nodes = [positions_of_nodes(whole, part) for part in segments]
         lengths = np.concatenate([part.lengths for part in segments])
@@ -53,7 +50,7 @@ class Surroundings:
         corners = whole.places[whole.faces]
         component = connected_components(whole.n_vertices, *edges_of(corners[chosen]))
         chosen &= np.isin(component[corners[:, 0]], component[corners[crossed, 0]])
-        if chosen.mean() > LARGEST_SHARE:
+        if chosen.all():
             return None
         faces = np.flatnonzero(chosen)
         vertices, corners = np.unique(whole.faces[faces], return_inverse=True)
