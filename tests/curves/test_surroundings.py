@@ -66,7 +66,8 @@ def test_what_is_farther_away_does_not_matter(parts_used):
         np.concatenate([small.vertices, small.vertices + np.array([0, 0, 3])]),
         np.concatenate([small.faces, small.faces + small.n_vertices]),
     )
-    beside = sh.signed_distance([apart.polyline(arc(6.3, *e)) for e in ends], apart)
+    with pytest.warns(sh.errors.UnreachedWarning, match=f"{small.n_vertices} of {apart.n_vertices}"):
+        beside = sh.signed_distance([apart.polyline(arc(6.3, *e)) for e in ends], apart)
     np.testing.assert_allclose(beside.values[: small.n_vertices], near, atol=1e-9)
     assert np.isnan(beside.values[small.n_vertices :]).all()
     assert len(beside.diagnostics.unreached) == small.n_vertices

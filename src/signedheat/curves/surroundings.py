@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints, mask_of
 from ..fields.field import Field
+from ..fields.solutions import unreached_vertices
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments
 from ..parallel import PointTree
@@ -88,7 +89,7 @@ class Surroundings:
         side = positive[component[beyond]].astype(float) - negative[component[beyond]]
         values[beyond] = np.where(side == 0, np.nan, side * far_value)
         values = values[whole.places]
-        diagnostics = replace(field.diagnostics, unreached=np.flatnonzero(np.isnan(values)))
+        diagnostics = replace(field.diagnostics, unreached=unreached_vertices(whole, values))
         return Field(whole, values, diagnostics)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Bools, Floats, mask_of
+from ..arrays import Bools, Floats, Ints, mask_of
 from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..geodesics.exact_distance import shortest_arcs
@@ -59,14 +59,7 @@ def _(
         cloud = discretization.domain
         used = mask_of(cloud.n_points, cloud.triangulation.faces)
         values = spread(cloud.points, values, used)[cloud.representatives]
-    unreached = np.flatnonzero(np.isnan(values))
-    if len(unreached):
-        warn_user(
-            f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them "
-            f"{_named(discretization.domain, unreached[0])}: distance there is NaN. Put a source on every part, or "
-            "join the parts",
-            UnreachedWarning,
-        )
+    unreached = unreached_vertices(discretization.domain, values)
     small = small_loops(source)
     notes = (*discretization.notes, *([SmallLoops(small)] if small else []))
     noted = replace(diagnostics, unreached=unreached).noting(*notes)
@@ -75,6 +68,18 @@ def _(
         added = everywhere[len(values) : triangulation.n_vertices]
         finer = Field(triangulation, np.concatenate([values, added]), noted, source=source)
     return Field(discretization.domain, values, noted, source=source, finer=finer)
+
+
+def unreached_vertices(domain: object, values: Floats) -> Ints:
+    """Return (k,) the vertices of a surface whose distance, (n,), is NaN, after a warning if there are any."""
+    unreached = np.flatnonzero(np.isnan(values))
+    if len(unreached):
+        warn_user(
+            f"no source is connected to {len(unreached)} of {len(values)} vertices, the first of them "
+            f"{_named(domain, unreached[0])}: distance there is NaN. Put a source on every part, or join the parts",
+            UnreachedWarning,
+        )
+    return unreached
 
 
 def _named(domain: object, vertex: int) -> str:
