@@ -388,7 +388,7 @@ def open_bounding(given: OpenPieces, closed: Floats, nested: Nesting = "given", 
     """
     soups = are_soups(given.pieces, given.clusters)
     if soups.all() or not soups.any():
-        return _open_bounding(given, soups.any(), closed, nested, united)
+        return _open_bounding(given, bool(soups.any()), closed, nested, united)
     signs, bounds = np.ones(len(soups)), np.zeros(len(soups), dtype=bool)
     loose, levels, overlap = np.full(len(soups), -1), np.full(len(soups), 0.5), False
     for is_soup in (False, True):
