@@ -17,7 +17,7 @@ import pytest
 import signedheat as sh
 from public_names import PUBLIC, methods
 from refusals import refused
-from signedheat import batches, constraints, morphology, samples
+from signedheat import batches, constraints, morphology, samples, view
 from signedheat.cli import main
 from signedheat.errors import GeometryError, SignedHeatError, UnsupportedTypeError
 from signedheat.methods import Convex, Extrapolated, Geodesic
@@ -101,7 +101,17 @@ def levelled(mesh):
 
 
 BOX = [[-2] * 3, [2] * 3]
+RANDOM = [samples.without_faces, samples.with_noise, samples.with_flipped_faces, samples.with_duplicate_faces]
+RANDOM += [samples.soup, samples.oriented_points]
 NUMBERS = [
+    (samples.sphere, "subdivisions"), (partial(samples.sphere, 1), "radius"), (samples.duck, "n"),
+    *((samples.torus, name) for name in ("major", "minor", "n_around", "n_across")),
+    (partial(samples.without_patches, BALL, radius=0.3), "n_patches"),
+    *((partial(samples.without_patches, BALL, 1), name) for name in ("radius",)),
+    (partial(samples.without_patches, BALL, 1, 0.3), "seed"),
+    *((partial(function, BALL), name) for function, name in zip(
+        RANDOM, ("fraction", "amplitude", "fraction", "fraction", "jitter", "n_points"), strict=True)),
+    *((partial(function, BALL, 1), "seed") for function in RANDOM),
     *((partial(sh.DigitalSurface, np.ones((2, 2, 2), dtype=bool)), name) for name in ("radius", "spacing")),
     (partial(sh.PointCloud, CLOUD.points), "n_neighbors"), (partial(sh.close_curves, CURVE, BALL), "diffusion"),
     *((partial(sh.complete, BALL), name) for name in ("seal", "smallest", "diffusion")),
@@ -155,6 +165,13 @@ NUMBERS = [
         "bytes", "elements", "points", "seconds")),
 ]  # fmt: skip
 """Calls that take a number, and its name."""
+PICTURES = [
+    (partial(view.save_surface, FIELDS["surface"], "a.png"), "n_contours"),
+    (partial(view.save_surface, FIELDS["surface"], "a.png"), "up"), (partial(view.save_scene, BALL, "a.png"), "up"),
+    (partial(view.save_slices, FIELDS["grid"], "a.png"), "levels"),
+    (partial(view.save_slices, FIELDS["plane"], "a.png"), "levels"),
+    *((partial(view.new_figure, **{other: 3.0}), name) for name, other in (("width", "height"), ("height", "width"))),
+]  # fmt: skip
 UNCHECKED = "results|Solid|IntrinsicTriangulation|batches.Batch|batches.Outcome"
 """Classes that functions of this package make, from numbers of their own."""
 ELSEWHERE = {"read_step": {"deflection"}, "read_volume": {"level", "radius"}, "tetrahedralize": {"grading"}}
@@ -172,6 +189,31 @@ def test_numbers_are_finite_and_real(call, name):
             continue  # one for each axis, or vertex
         with refused(SignedHeatError, element=name):
             call(**{name: number})
+
+
+@pytest.mark.parametrize(("call", "name"), PICTURES, ids=lambda thing: thing if isinstance(thing, str) else "")
+def test_numbers_of_pictures(tmp_path, monkeypatch, call, name):
+    pytest.importorskip("matplotlib")
+    monkeypatch.chdir(tmp_path)
+    wrong = [np.nan, np.inf, "x", 0.5j, -1, 0.5, 1001, 10**400, True, [1]]
+    for number in wrong[:4] if name == "levels" else wrong[:5] if name in ("width", "height") else wrong:
+        with refused(SignedHeatError, element=name):
+            call(**{name: [number] if name == "levels" else number})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        partial(samples.sphere, 20),
+        partial(samples.sphere, 10**6),
+        partial(samples.torus, n_around=10**6, n_across=10**6),
+        partial(samples.duck, 10**5),
+    ],
+)
+def test_samples_larger_than_memory(call):
+    with refused(sh.errors.MemoryLimitError):
+        call()
 
 
 def test_numbers_of_every_kind():

@@ -8,17 +8,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .errors import SignedHeatError, counted
 from .fields.field import Field
 from .grids.grid import Grid
+from .memory import refuse_beyond_memory
 from .shapes.transforms import joined_triangles
 from .surfaces.point_cloud import PointCloud
 from .surfaces.triangle_mesh import TriangleMesh
-from .validation import positive_number, whole_number
+from .validation import coordinates, finite_number, positive_number, whole_number
 
 __all__ = [
     "broken_duck", "duck", "oriented_points", "soup", "sphere", "torus", "union", "with_duplicate_faces",
     "with_flipped_faces", "with_noise", "without_faces", "without_patches",
 ]  # fmt: skip
+
+BYTES_PER_FACE, BYTES_PER_DUCK_CELL = 130, 103
+"""Memory for each face of a sphere or a torus, and for each cell of a cube around a duck, as measured."""
 
 
 def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0, 0)) -> TriangleMesh:
@@ -43,7 +48,13 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
     >>> sphere(2)
     TriangleMesh(162 vertices, 320 faces)
     """
-    subdivisions = whole_number(subdivisions, "subdivisions", 0)
+    subdivisions, position = whole_number(subdivisions, "subdivisions", 0), coordinates([center], "center", 3)
+    refuse_beyond_memory(
+        f"a sphere of {subdivisions} subdivisions",
+        subdivisions,
+        lambda n: BYTES_PER_FACE * 20 * 4.0 ** min(n, 500),
+        lambda n: f"divide its faces at most {counted(n, 'time')}",
+    )
     golden = (1 + 5**0.5) / 2
     points = np.array([[s, t * golden, 0] for s in (-1, 1) for t in (-1, 1)], dtype=float)
     points = np.concatenate([np.roll(points, k, axis=1) for k in range(3)])
@@ -68,7 +79,7 @@ def sphere(subdivisions: int = 4, radius: float = 1.0, center: ArrayLike = (0, 0
             ]
         )
     points *= positive_number(radius, "radius") / np.linalg.norm(points, axis=1, keepdims=True)
-    return TriangleMesh(points + np.asarray(center), faces)
+    return TriangleMesh(points + position, faces)
 
 
 def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: int = 48) -> TriangleMesh:
@@ -93,6 +104,14 @@ def torus(major: float = 1.0, minor: float = 0.4, n_around: int = 96, n_across: 
     >>> torus(n_around=6, n_across=4)
     TriangleMesh(24 vertices, 48 faces)
     """
+    major, minor = positive_number(major, "major"), positive_number(minor, "minor")
+    n_around, n_across = whole_number(n_around, "n_around", 3), whole_number(n_across, "n_across", 3)
+    refuse_beyond_memory(
+        f"a torus of {n_around} × {n_across} vertices",
+        n_around * n_across,
+        lambda n: 2 * BYTES_PER_FACE * float(n),
+        lambda n: f"take {counted(n, 'vertex')} at most",
+    )
     u, v = np.meshgrid(np.arange(n_around), np.arange(n_across), indexing="ij")
     around, across = 2 * np.pi * u / n_around, 2 * np.pi * v / n_across
     ring = major + minor * np.cos(across)
@@ -118,6 +137,10 @@ def duck(n: int = 56) -> TriangleMesh:
         Two closed bodies with outward normals.
     """
     lower, upper = np.array([-1.15, -0.8, -0.75]), np.array([1.0, 0.8, 1.15])
+    n = whole_number(n, "n", 8)
+    refuse_beyond_memory(
+        f"a duck of {n} cells", n, lambda k: BYTES_PER_DUCK_CELL * float(k) ** 3, lambda k: f"take {k} cells at most"
+    )
     spacing = 2.15 / n
     grid = Grid(lower, spacing, np.ceil((upper - lower) / spacing).astype(int) + 1)
     x = grid.points
@@ -185,9 +208,10 @@ def without_patches(mesh: TriangleMesh, n_patches: int, radius: float, seed: int
     TriangleMesh
         All vertices, and the remaining faces.
     """
-    picked = [int(np.random.default_rng(seed).integers(mesh.n_vertices))]
+    n_patches, radius = whole_number(n_patches, "n_patches", 1), finite_number(radius, "radius", 0)
+    picked = [int(_random(seed).integers(mesh.n_vertices))]
     nearest = np.linalg.norm(mesh.vertices - mesh.vertices[picked[0]], axis=1)
-    while len(picked) < n_patches:
+    while len(picked) < min(n_patches, mesh.n_vertices):
         picked.append(int(np.argmax(nearest)))
         nearest = np.minimum(nearest, np.linalg.norm(mesh.vertices - mesh.vertices[picked[-1]], axis=1))
     middles = mesh.vertices[mesh.faces].mean(axis=1)
@@ -212,7 +236,7 @@ def without_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> Triangl
     TriangleMesh
         All vertices, and the remaining faces.
     """
-    return TriangleMesh(mesh.vertices, mesh.faces[np.random.default_rng(seed).random(mesh.n_faces) >= fraction])
+    return TriangleMesh(mesh.vertices, mesh.faces[_random(seed).random(mesh.n_faces) >= _share(fraction)])
 
 
 def with_noise(mesh: TriangleMesh, amplitude: float, seed: int = 0) -> TriangleMesh:
@@ -232,7 +256,7 @@ def with_noise(mesh: TriangleMesh, amplitude: float, seed: int = 0) -> TriangleM
     TriangleMesh
         The same faces, with moved vertices.
     """
-    moves = np.random.default_rng(seed).normal(scale=amplitude, size=mesh.vertices.shape)
+    moves = _random(seed).normal(scale=finite_number(amplitude, "amplitude", 0), size=mesh.vertices.shape)
     return TriangleMesh(mesh.vertices + moves, mesh.faces)
 
 
@@ -253,7 +277,7 @@ def with_flipped_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> Tr
     TriangleMesh
         The same vertices and faces, some of which have their corners in reverse order.
     """
-    flipped = np.random.default_rng(seed).random(mesh.n_faces) < fraction
+    flipped = _random(seed).random(mesh.n_faces) < _share(fraction)
     return TriangleMesh(mesh.vertices, np.where(flipped[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
@@ -274,7 +298,7 @@ def with_duplicate_faces(mesh: TriangleMesh, fraction: float, seed: int = 0) -> 
     TriangleMesh
         All faces, followed by the copies, which have the same vertices.
     """
-    doubled = np.random.default_rng(seed).random(mesh.n_faces) < fraction
+    doubled = _random(seed).random(mesh.n_faces) < _share(fraction)
     return TriangleMesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[doubled]]))
 
 
@@ -296,7 +320,7 @@ def soup(mesh: TriangleMesh, jitter: float = 0.0, seed: int = 0) -> TriangleMesh
         The same triangles, in order, with three vertices for each.
     """
     corners = mesh.vertices[mesh.faces]
-    corners = corners + np.random.default_rng(seed).normal(scale=jitter, size=(mesh.n_faces, 1, 3))
+    corners = corners + _random(seed).normal(scale=finite_number(jitter, "jitter", 0), size=(mesh.n_faces, 1, 3))
     return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * mesh.n_faces).reshape(-1, 3))
 
 
@@ -317,9 +341,22 @@ def oriented_points(mesh: TriangleMesh, n_points: int, seed: int = 0) -> PointCl
     PointCloud
         The points, with normals.
     """
-    rng = np.random.default_rng(seed)
+    rng, n_points = _random(seed), whole_number(n_points, "n_points", 1)
     face = rng.choice(mesh.n_faces, size=n_points, p=mesh.face_areas / mesh.face_areas.sum())
     root, share = np.sqrt(rng.random(n_points)), rng.random(n_points)
     weights = np.stack([1 - root, root * (1 - share), root * share], axis=1)
     points = np.einsum("ij,ijk->ik", weights, mesh.vertices[mesh.faces[face]])
     return PointCloud(points, mesh.face_area_vectors[face])
+
+
+def _random(seed: int) -> np.random.Generator:
+    """Return a generator of random numbers for a seed, which must not be negative."""
+    return np.random.default_rng(whole_number(seed, "seed", 0))
+
+
+def _share(fraction: float) -> float:
+    """Return a fraction as a float; raise an error unless it is from 0 to 1."""
+    share = finite_number(fraction, "fraction", 0)
+    if share > 1:
+        raise SignedHeatError(f"fraction must be from 0 to 1, not {share:g}", element="fraction")
+    return share

@@ -15,6 +15,7 @@ from ..arrays import Floats
 from ..errors import GeometryError
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..packages import lazy_module, require
+from ..validation import positive_number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +65,8 @@ def new_figure(width: float, height: float) -> Figure:
     matplotlib.figure.Figure
         The figure, into whose axes functions such as `draw_slices` draw.
     """
-    figure: Figure = mpl_figure.Figure(figsize=(width, height), layout="constrained", facecolor="white")
+    size = positive_number(width, "width"), positive_number(height, "height")
+    figure: Figure = mpl_figure.Figure(figsize=size, layout="constrained", facecolor="white")
     backend_agg.FigureCanvasAgg(figure)
     return figure
 

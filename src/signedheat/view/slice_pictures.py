@@ -22,6 +22,7 @@ from ..shapes.kinds import SpaceSources
 from ..surfaces.point_cloud import PointCloud
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
+from ..validation import numbers
 from .figures import add_color_bar, distance_colors, isolines_between, picture, range_of
 from .surface_pictures import outside_of, triangulated
 
@@ -213,7 +214,10 @@ def _draw_panel(
     isolines = isolines[(isolines > low) & (isolines < high)]
     if len(isolines):
         panel.contour(u, v, shown, isolines, colors="#20303c", linewidths=0.35, alpha=0.7)
-    for level, color in ((0.0, "black"), *((level, "#1b6e3c") for level in levels)):
+    given = numbers(levels, "levels")
+    if given.ndim != 1 or not np.isfinite(given).all():
+        raise GeometryError("levels must be finite numbers", remedy="give a list of numbers", element="levels")
+    for level, color in ((0.0, "black"), *((level, "#1b6e3c") for level in given.tolist())):
         if low < level < high:
             for style, lines in lines_by_style(u, v, values, level, trusted).items():
                 panel.add_collection(

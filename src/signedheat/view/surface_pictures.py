@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..curves.cut_surface import CutSurface
+from ..errors import GeometryError
 from ..fields.field import Field
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.numpy_files import write_npz
@@ -33,6 +34,7 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface_curves import Curve, CurveOrPoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
+from ..validation import finite_number, numbers, whole_number
 from .figures import (
     INSIDE_TO_OUTSIDE,
     PICTURE_FORMATS,
@@ -44,6 +46,8 @@ from .figures import (
     range_of,
 )
 
+MOST_ISOLINES = 1000
+"""Largest number of isolines in a picture."""
 LONGER_SIDE = 900
 """The larger of width and height of pictures of surfaces, in pixels."""
 MARGIN_PIXELS = 10
@@ -94,7 +98,7 @@ def axes_of_view(direction: Floats, up: int = 2) -> Floats:
 
     Axis `up` points upwards in the picture, unless the eye looks along it.
     """
-    towards = np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
+    up, towards = axis_number(up), np.asarray(direction, dtype=np.float64) / np.linalg.norm(direction)
     upwards = np.eye(3)[up] if abs(towards[up]) < 0.95 else np.eye(3)[up - 1]
     right = np.cross(upwards, towards)
     right /= np.linalg.norm(right)
@@ -106,8 +110,16 @@ def oblique(elevation: float, azimuth: float, up: int = 2) -> Floats:
 
     Both are in degrees.
     """
-    e, a = np.radians([elevation, azimuth])
-    return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], up - 2)
+    e, a = np.radians([finite_number(elevation, "elevation"), finite_number(azimuth, "azimuth")])
+    return np.roll([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis_number(up) - 2)
+
+
+def axis_number(up: int) -> int:
+    """Return the number of an axis, or raise an error unless it is 0, 1 or 2."""
+    number = whole_number(up, "up", 0)
+    if number > 2:
+        raise GeometryError(f"up must be 0, 1 or 2, not {number:g}", element="up")
+    return number
 
 
 def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple[Floats, Ints, Floats]:
@@ -359,7 +371,14 @@ def draw_surface(
     source_mesh, mesh, values = _source_mesh_and_painted(field)
     given = sources if isinstance(sources, Sequence) else [sources]
     flat = [item for source in given for item in (source if isinstance(source, Sequence) else [source])]
-    direction = toward_sources(source_mesh, flat, up) if view is None else np.asarray(view, dtype=np.float64)
+    n_contours = whole_number(n_contours, "n_contours", 0)
+    if n_contours > MOST_ISOLINES:
+        raise GeometryError(f"n_contours must be at most {MOST_ISOLINES}, not {n_contours:g}", element="n_contours")
+    direction = toward_sources(source_mesh, flat, up) if view is None else numbers(view, "view")
+    if view is not None and (
+        direction.shape not in ((2,), (3,)) or not (np.isfinite(direction).all() and direction.any())
+    ):
+        raise GeometryError("view must be two angles in degrees, or a direction", element="view")
     if len(direction) == 2:
         direction = oblique(direction[0], direction[1], up)
     camera = Camera.around(mesh.vertices[np.unique(mesh.faces)], direction, up)
