@@ -99,6 +99,9 @@ from signedheat.cli.kernel_runs import JOBS
 warnings.simplefilter("ignore")
 for job in JOBS.values():
     job()
+ball = signedheat.samples.sphere(1)
+two = signedheat.samples.union(ball, signedheat.samples.sphere(1, center=(1, 0, 0)))
+signedheat.complete(two, seal=0.5)  # its vertices are read-only
 modules = [entry.name for entry in pkgutil.walk_packages(signedheat.__path__, "signedheat.")]
 values = {value for name in modules for value in vars(importlib.import_module(name)).values() if callable(value)}
 kernels = {value for value in values if isinstance(value, compiled.Kernel)}

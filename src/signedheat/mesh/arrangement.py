@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from .box_tree import BoxTree
 from .components import connected_components, grouped, members_of, numbered, sums_of
@@ -110,7 +110,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
     on_open = _on_open_edges(points, table, reaches)
 
     meetings, positions, meeting_slacks = _meetings(
-        np.ascontiguousarray(points), faces, table.vertices, table.face_edges, pairs, slacks
+        read_only(np.ascontiguousarray(points)), faces, table.vertices, table.face_edges, pairs, slacks
     )
     kinds, first, second = meetings.T
     new = kinds >= TWO_EDGES
@@ -222,7 +222,9 @@ def _with_segments(
     members = _members(faces, table, lines, np.unique(pairs))
     chains = Chains(lines.ends, lines.on.starts(len(lines.ends)), lines.on.points)
     starts = members.starts(len(faces))
-    rows, sides = _segments(points, starts, members.points, table.face_edges, chains, pairs, ON_LINE * slacks)
+    rows, sides = _segments(
+        read_only(points), starts, members.points, table.face_edges, chains, pairs, ON_LINE * slacks
+    )
     own = rows[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
     ends[rows[own, 1] - len(lines.ends)] = rows[own, 2:]
@@ -240,7 +242,7 @@ def _with_crossings(
     tree = BoxTree.around(corners)
     within = slacks[records.faces]
     starts, near = tree.meeting(corners, within)
-    touching, crossing, positions = _cross(points, records.faces, records.lines, ends, starts, near, within)
+    touching, crossing, positions = _cross(read_only(points), records.faces, records.lines, ends, starts, near, within)
     within = within[crossing[:, 0]]
     first, second = records.lines[crossing].T
     n_edges = len(lines.ends) - len(lines.sides)
@@ -329,7 +331,7 @@ def _divided(
         local[order[np.searchsorted(keys[order], segment_faces * n + end)]] for end in (segment_tails, segments.points)
     ]
     pieces, owners, across = triangulate_faces(
-        points,
+        read_only(points),
         member_starts,
         members,
         corners,
@@ -505,8 +507,9 @@ def _meetings(
                         touch[s, i, k], on[s, i], hit[1 - s, k] = True, True, True
                 for d in range(3):
                     heights[s, i] += normals[1 - s, d] * (points[v, d] - points[faces[g, 0], d])
+                    position[d] = points[v, d]
                 flat = not on[s, i] and abs(heights[s, i]) <= slack
-                if flat and _is_over(points, points[v], faces[g], normals[1 - s]):
+                if flat and _is_over(points, position, faces[g], normals[1 - s]):
                     meetings.append((IN_FACE, g, v))
                     positions.append((0.0, 0.0, 0.0))
                     on[s, i] = True
