@@ -50,7 +50,7 @@ def knot(n_around=120, n_across=12):
     return sh.TriangleMesh(points.reshape(-1, 3), grid.faces)
 
 
-TORUS = samples.torus(n_around=48, n_across=24)
+TORUS = samples.torus(n_around=36, n_across=18)
 CLOSED = {"sphere": samples.sphere(3), "torus": TORUS, "knot": knot(), "box": box((0, 0, 0), (3, 1, 0.2))}
 WAYS = ("as it is", "a tenth turned", "half turned", "a patch turned", "inside out")
 
