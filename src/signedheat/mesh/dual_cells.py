@@ -237,21 +237,24 @@ def dual_triangles(
 
 
 def _better_diagonals(around: Floats, axes: NDArray[np.integer], shares: Floats) -> tuple[Bools, Bools]:
-    """Choose diagonals of quadrilaterals around crossed edges.
+    """Choose diagonals of quadrilaterals around n crossed edges, with their `axes` and `shares` of `Crossings`.
 
-    `around` are their corners relative to the first nodes of the edges, (n, 4, 3) in cells. Returns (n,) whether the
-    second diagonal is better than the first, and (n,) whether one of them stays within the tetrahedra of the edge.
+    `around` are the corners relative to the first nodes of the edges, (n, 4, 3) in cells. Returns (n,) whether the
+    second diagonal (corner 1 to 3) is better than the first (0 to 2), and (n,) whether one of them stays within the
+    tetrahedra of the edge. A diagonal outside is never chosen. Of two inside, the better one makes triangles that cross
+    the edge nearer to where the level set does, or is shorter.
     """
     rows, corners = np.arange(len(around))[:, None], np.arange(4)
-    height = around[rows, corners, axes[:, None]]
-    flat = np.stack([around[rows, corners, AXES_AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
-    safe, off, length = np.empty((2, len(axes)), dtype=bool), np.empty((2, len(axes))), np.empty((2, len(axes)))
+    along_edge = around[rows, corners, axes[:, None]]
+    across_edge = np.stack([around[rows, corners, AXES_AFTER[axes, 1 + k][:, None]] for k in range(2)], axis=2)
+    safe, misses, lengths = np.empty((2, len(axes)), dtype=bool), np.empty((2, len(axes))), np.empty((2, len(axes)))
     for k in range(2):
-        safe[k], crossed_at = _safe(np.roll(flat, -k, axis=1), np.roll(height, -k, axis=1))
-        off[k] = np.abs(crossed_at - shares)
-        length[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
-    nearer = np.where(np.abs(off[0] - off[1]) > DIAGONAL_CLEARANCE, off[1] < off[0], length[1] < length[0])
-    return safe[1] & (nearer | ~safe[0]), safe[0] | safe[1]
+        safe[k], crossed_at = _safe(np.roll(across_edge, -k, axis=1), np.roll(along_edge, -k, axis=1))
+        misses[k] = np.abs(crossed_at - shares)
+        lengths[k] = np.linalg.norm(around[:, k] - around[:, k + 2], axis=1)
+    differ = np.abs(misses[0] - misses[1]) > DIAGONAL_CLEARANCE
+    second_is_better = np.where(differ, misses[1] < misses[0], lengths[1] < lengths[0])
+    return safe[1] & (second_is_better | ~safe[0]), safe[0] | safe[1]
 
 
 def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) -> tuple[Floats, Ints]:

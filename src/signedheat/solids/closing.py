@@ -518,29 +518,35 @@ def _of_flat_faces(corners: Floats, normals: Floats, bent: bool) -> tuple[Floats
 def _spanned(
     surface: _Surface, loop: Ints, behind: Ints, frame: Frame | None, bends: bool
 ) -> tuple[Floats, Ints] | None:
-    """Make the lid of a loop, triangulated in the plane `frame`, or in a disc without one: see `_lid`.
+    """Make the lid of a loop of n vertices, triangulated in the plane `frame`, or in a disc without one.
 
-    None if the loop crosses itself there. `behind` are the faces behind the edges of the loop; the lid is curved if
-    `bends`.
+    Return what `_lid` does: (k, 3) added points and (m, 3) triangles; None if the loop crosses itself there. `behind`
+    are the (n,) faces behind the edges of the loop. The lid is curved if `bends` and the surface tells how; otherwise
+    it has nearly the least area.
     """
     corners = surface.vertices[loop]
     rim = lids.SmoothRim.of(corners)
-    smooth = lids.pattern(rim, frame)
-    if smooth is None:
+    pattern = lids.pattern(rim, frame)
+    if pattern is None:
         return None
-    flat = lids.film(smooth)
-    plate = None
-    if bends:
-        width, points = width_of(flat), flat.vertices[: flat.n_rim]
-        near = samples_near(surface.triangles, surface.tree, surface.patches, PointTree(points), STRIP_WIDTH * width)
-        ends = surface.patches[behind[rim.edges_at(flat.shares)]]
-        normals, curvatures, held = continuation(flat, near, ends, width)
-        plate = lids.plate(flat, normals, curvatures, held, width) if held.any() else None
-        if plate is not None and _is_covered(surface, plate, flat):
-            plate, bends = None, False
-    if bends and plate is None and (lid := _of_flat_faces(corners, surface.normals[behind], True)):
+    film = lids.film(pattern)
+    plate = _plate(surface, film, behind[rim.edges_at(film.shares)]) if bends else None
+    if plate is not None and _is_covered(surface, plate, film):
+        plate = None
+    elif bends and plate is None and (lid := _of_flat_faces(corners, surface.normals[behind], True)):
         return lid
-    return lids.draped(corners, rim.starts, frame, plate or flat)
+    return lids.draped(corners, rim.starts, frame, plate or film)
+
+
+def _plate(surface: _Surface, film: Lid, behind: Ints) -> Lid | None:
+    """Bend the lid of least area as the surface bends towards its rim; None if that is not known or not possible.
+
+    `behind` are the (n_rim,) faces behind the edges of its rim.
+    """
+    width, rim_points = width_of(film), PointTree(film.vertices[: film.n_rim])
+    samples = samples_near(surface.triangles, surface.tree, surface.patches, rim_points, STRIP_WIDTH * width)
+    normals, curvatures, held = continuation(film, samples, surface.patches[behind], width)
+    return lids.plate(film, normals, curvatures, held, width) if held.any() else None
 
 
 def _is_covered(surface: _Surface, bent: Lid, flat: Lid) -> bool:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, OutsideError, SignedHeatError, counted
 from ..grids.exact_levels import on_level
 from ..grids.grid import RESOLUTION, Grid
@@ -91,39 +91,61 @@ class NodePlanes:
         return self._values_and_gradients(points)[1]
 
     def _values_and_gradients(self, points: Floats) -> tuple[Floats, Floats]:
-        """(n,) values and (n, 3) gradients at (n, 3) points, from the planes at the eight nodes of the cell."""
+        """(n,) values and (n, 3) gradients at (n, 3) points, from the planes at the eight nodes of the cell.
+
+        The planes are weighted trilinearly, but where a sharp edge passes the cell, only one of them counts.
+        """
         cells = (points - self.origin) / self.spacing
         base = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.values.shape) - 2)
-        shares = (cells - base)[:, None]
+        shares = (cells - base)[:, None]  # (n, 1, 3) positions in the cells, from 0 to 1
         weights = np.where(CELL_CORNERS == 1, shares, 1 - shares).prod(axis=2)
         weights[weights < LEAST_WEIGHT] = 0.0
         nodes = tuple((base[:, None] + CELL_CORNERS).transpose(2, 0, 1))
-        values, slopes = self.values[nodes], self.gradients[nodes]
-        known = (weights > 0) & self.known[nodes]
-        shared = np.where(known, weights, 0.0)
-        total = shared.sum(axis=1, keepdims=True)
-        middle = (shared[..., None] * slopes).sum(axis=1) / np.maximum(total, LEAST_WEIGHT)
-        slopes = np.where((known | (total < LEAST_WEIGHT))[..., None], slopes, middle[:, None])
+        values, known = self.values[nodes], (weights > 0) & self.known[nodes]
+        slopes = _completed(self.gradients[nodes], known, weights)
         heights = values + np.einsum("nkd,nkd->nk", slopes, (shares - CELL_CORNERS) * self.spacing)
-        mixed, mean = (weights * heights).sum(axis=1), (weights[..., None] * slopes).sum(axis=1)
-        directions = unit(slopes)
-        mean_direction = unit(np.where(known[..., None], directions, 0.0).sum(axis=1))
-        agreement = np.where(known, np.einsum("nkd,nd->nk", directions, mean_direction), 1.0).min(axis=1)
-        rows = np.flatnonzero(agreement < EDGE_COSINE)
-        values, slopes, heights, counts = values[rows], slopes[rows], heights[rows], known[rows]
-        offsets = (CELL_CORNERS[None, :] - CELL_CORNERS[:, None]) * self.spacing  # from each corner to the others
-        planes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, offsets)
-        errors, corners_chosen = [], []
-        for sign in (1.0, -1.0):
-            hidden = np.where(counts, 0.0, -np.inf)
-            highest = (sign * planes + hidden[:, :, None]).max(axis=1)
-            errors.append(np.where(counts, np.abs(sign * highest - values), 0.0).sum(axis=1))
-            corners_chosen.append((sign * heights + hidden).argmax(axis=1))
-        for own, other, place in zip(errors, errors[::-1], corners_chosen, strict=True):
-            clear = np.flatnonzero(own < CLEAR_ERRORS * other)
-            mixed[rows[clear]] = heights[clear, place[clear]]
-            mean[rows[clear]] = slopes[clear, place[clear]]
-        return mixed, mean
+        results, gradients = (weights * heights).sum(axis=1), (weights[..., None] * slopes).sum(axis=1)
+        node = _node_that_counts(values, slopes, heights, known, self.spacing)
+        sharp = np.flatnonzero(node >= 0)
+        results[sharp] = heights[sharp, node[sharp]]
+        gradients[sharp] = slopes[sharp, node[sharp]]
+        return results, gradients
+
+
+def _completed(slopes: Floats, known: Bools, weights: Floats) -> Floats:
+    """(n, 8, 3) gradients at nodes; those not `known`, (n, 8), become the mean of known ones by (n, 8) weights."""
+    known_weights = np.where(known, weights, 0.0)
+    total = known_weights.sum(axis=1, keepdims=True)
+    mean = (known_weights[..., None] * slopes).sum(axis=1) / np.maximum(total, LEAST_WEIGHT)
+    return np.where((known | (total < LEAST_WEIGHT))[..., None], slopes, mean[:, None])
+
+
+def _node_that_counts(values: Floats, slopes: Floats, heights: Floats, known: Bools, spacing: Floats) -> Ints:
+    """(n,) the node, 0 to 7, whose plane counts alone at each point, if a sharp edge passes its cell; else −1.
+
+    The planes, with (n, 8) values and (n, 8, 3) slopes at their own nodes, have (n, 8) `heights` at the points. At a
+    convex edge the surface is their maximum, at a concave one their minimum: whichever reproduces the values clearly
+    better. Where neither does, no plane counts alone.
+    """
+    directions = unit(slopes)
+    mean_direction = unit(np.where(known[..., None], directions, 0.0).sum(axis=1))
+    agreement = np.where(known, np.einsum("nkd,nd->nk", directions, mean_direction), 1.0).min(axis=1)
+    rows = np.flatnonzero(agreement < EDGE_COSINE)  # points whose cells a sharp edge passes
+    values, slopes, heights, known = values[rows], slopes[rows], heights[rows], known[rows]
+    offsets = (CELL_CORNERS[None, :] - CELL_CORNERS[:, None]) * spacing  # from each corner to the others
+    # (r, 8, 8) height of the plane of node k at node j
+    planes_at_nodes = values[:, :, None] + np.einsum("nkd,kjd->nkj", slopes, offsets)
+    excluded = np.where(known, 0.0, -np.inf)
+    errors, extreme_nodes = [], []
+    for sign in (1.0, -1.0):  # the maximum; the minimum
+        extremes = sign * (sign * planes_at_nodes + excluded[:, :, None]).max(axis=1)
+        errors.append(np.where(known, np.abs(extremes - values), 0.0).sum(axis=1))
+        extreme_nodes.append((sign * heights + excluded).argmax(axis=1))
+    result = np.full(len(agreement), -1)
+    for k in range(2):
+        clear = errors[k] < CLEAR_ERRORS * errors[1 - k]
+        result[rows[clear]] = extreme_nodes[k][clear]
+    return result
 
 
 @public_call

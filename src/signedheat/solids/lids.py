@@ -260,19 +260,22 @@ def _in_polygon(shares: Floats, points: Floats) -> Floats:
 
 
 def film(pattern: Lid) -> Lid:
-    """Return a lid with vertices moved so that its area is nearly least (Pinkall & Polthier 1993); the rim stays."""
-    n, vertices, faces, plane = pattern.n_rim, pattern.vertices, pattern.faces, pattern.plane
-    if n == len(vertices):
+    """Return a lid with vertices moved so that its area is nearly least (Pinkall & Polthier 1993); the rim stays.
+
+    Each round extends the rim harmonically over the surface of the round before; the first, over the plane.
+    """
+    n_rim, vertices, faces, n = pattern.n_rim, pattern.vertices, pattern.faces, len(pattern.vertices)
+    if n_rim == n:
         return pattern
-    edges, sides = np.unique(_sides(faces, len(plane)), return_inverse=True)
-    shape, size = np.c_[plane, np.zeros(len(plane))], np.ptp(vertices[:n], axis=0).max()
+    edge_keys, edge_of_side = np.unique(_sides(faces, n), return_inverse=True)
+    domain, size = np.c_[pattern.plane, np.zeros(n)], np.ptp(vertices[:n_rim], axis=0).max()
     for _ in range(1 + FILM_ROUNDS):
-        weights = np.bincount(sides.ravel(), _cotangents(shape, faces).ravel())
-        matrix = _laplacian(*np.divmod(edges, len(plane)), np.maximum(weights, 1e-6), len(plane))
-        shape = _extended(matrix, vertices[:n])
-        if np.abs(shape - vertices).max() <= 1e-12 * size:  # at rest, as a film in a plane is from the start
+        weights = np.bincount(edge_of_side.ravel(), _cotangents(domain, faces).ravel())
+        matrix = _laplacian(*np.divmod(edge_keys, n), np.maximum(weights, 1e-6), n)
+        domain = _extended(matrix, vertices[:n_rim])
+        if np.abs(domain - vertices).max() <= 1e-12 * size:  # at rest, as a film in a plane is from the start
             break
-        vertices = shape
+        vertices = domain
     return replace(pattern, vertices=vertices)
 
 
@@ -483,7 +486,8 @@ def _runs(points: Floats, sides: list[_Side]) -> list[_Run]:
 def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple[_Run, _Run, _Run]] | None:
     """Find three runs that make up a loop of `n_sides` sides and whose planes meet near it.
 
-    Return the (3,) point where they meet, and the runs; None if there are no such runs.
+    `points` are the (n, 3) points of the loop. Return the (3,) point where the planes meet, and the runs; None if there
+    are no such runs.
     """
     following = {run.first: run for run in runs}
     for first in runs:
@@ -492,11 +496,11 @@ def _peak(points: Floats, runs: list[_Run], n_sides: int) -> tuple[Floats, tuple
         if second is None or third is None or first.count + second.count + third.count != n_sides:
             continue
         around = (first, second, third)
-        planes = unit(np.stack([run.opening for run in around]))
-        if abs(np.linalg.det(planes)) < COPLANAR:
+        normals = unit(np.stack([run.opening for run in around]))
+        if abs(np.linalg.det(normals)) < COPLANAR:
             continue
         middles = np.stack([points[run.points].mean(axis=0) for run in around])
-        peak = np.linalg.solve(planes, (planes * middles).sum(axis=1))
+        peak = np.linalg.solve(normals, (normals * middles).sum(axis=1))
         corners = points[np.concatenate([run.points for run in around])]
         if np.linalg.norm(peak - corners.mean(axis=0)) < np.linalg.norm(np.ptp(corners, axis=0)):
             return peak, around

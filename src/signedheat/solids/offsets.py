@@ -90,29 +90,32 @@ class Offset:
     def _mitred(
         self, away: Floats, nearest_points: Floats, heights: Floats, gradients: Floats, reach: Floats
     ) -> tuple[Floats, Floats]:
-        """(n,) heights above the planes of the faces at the nearest points, up to the limit; (n, 3) gradients.
+        """(n,) signed heights above the planes of the faces at the nearest points, up to the limit; (n, 3) gradients.
 
-        `away` are (n, 3) vectors from the `nearest_points`, `heights` and `gradients` those of distance to the solid,
-        and `reach` the (n,) distances of the surface.
+        `away` are (n, 3) vectors from the `nearest_points` to the points. `heights`, (n,), and `gradients`, (n, 3), are
+        the distance to the solid and its gradient, and `reach` the (n,) distances of the surface. Only points at 1 to
+        2 · `limit` times that distance get other heights. All others are on the same side of the surface either way.
         """
-        far = np.abs(heights)
-        near = np.flatnonzero((heights * reach > 0) & (far >= np.abs(reach)) & (far < 2 * self.limit * np.abs(reach)))
+        distances = np.abs(heights)
+        is_near = (distances >= np.abs(reach)) & (distances < 2 * self.limit * np.abs(reach))
+        near = np.flatnonzero((heights * reach > 0) & is_near)
         if not len(near):
             return heights, gradients
         signs = np.sign(reach[near])
         features, tree = self.solid.tree.features, self.solid.tree.tree
         slack = MEETING_DISTANCE * float(np.ptp(tree.bounds[1].reshape(2, 3), axis=0).max())
 
-        def part(rows: Floats) -> tuple[Floats, Ints]:
-            """Heights and triangles of `_steepest` for some (k, 6) rows of points and vectors."""
-            starts, faces = tree.meeting(np.repeat(rows[:, None, :3], 3, axis=1), slack)
-            return _steepest(features.rows, starts, faces, self._normals, rows, slack)
+        def highest(queries: Floats) -> tuple[Floats, Ints]:
+            """(k,) heights and (k,) triangles of `_steepest` for (k, 6) nearest points and vectors from there."""
+            starts, faces = tree.meeting(np.repeat(queries[:, None, :3], 3, axis=1), slack)
+            return _steepest(features.rows, starts, faces, self._normals, queries, slack)
 
-        above, faces = in_chunks(part, np.concatenate([nearest_points[near], signs[:, None] * away[near]], axis=1))
-        beyond = (1 - self.limit) * np.abs(reach[near]) + far[near]  # heights above the ball that cuts off corners
-        planar = (faces >= 0) & (above > beyond)
+        queries = np.concatenate([nearest_points[near], signs[:, None] * away[near]], axis=1)
+        above_planes, faces = in_chunks(highest, queries)
+        above_ball = (1 - self.limit) * np.abs(reach[near]) + distances[near]  # of the ball that cuts off corners
+        planar = (faces >= 0) & (above_planes > above_ball)
         heights, gradients = heights.copy(), gradients.copy()
-        heights[near] = signs * np.where(faces >= 0, np.maximum(above, beyond), far[near])
+        heights[near] = signs * np.where(faces >= 0, np.maximum(above_planes, above_ball), distances[near])
         gradients[near[planar]] = self._normals[faces[planar]]
         return heights, gradients
 

@@ -203,15 +203,17 @@ def _strip_areas(rim: Rim, other: Rim) -> tuple[float, float]:
     The own area is the sum over edges of the rim of length times distance to the other rim. The second takes instead
     the part of that way along `Rim.onward`, so it is negative if the strip leads back over the surface.
     """
-    along = np.roll(rim.smooth, -1, axis=0) - rim.smooth
-    lengths, points = np.linalg.norm(along, axis=1), other.smooth
-    base = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
-    steps = np.linalg.norm(base, axis=1)
-    base /= np.maximum(steps, 1e-300)[:, None]
-    middles = rim.smooth + 0.5 * along
+    edges = np.roll(rim.smooth, -1, axis=0) - rim.smooth
+    lengths, points = np.linalg.norm(edges, axis=1), other.smooth
+    tangents = np.roll(points, -1, axis=0) - np.roll(points, 1, axis=0)
+    chords = np.linalg.norm(tangents, axis=1)
+    tangents /= np.maximum(chords, 1e-300)[:, None]
+    middles = rim.smooth + 0.5 * edges
     nearest = PointTree(points).query(middles)[1]
+    # the way to the other rim leads to the nearest of its points, or to a place beside it along its tangent
     across = points[nearest] - middles
-    across -= np.clip((across * base[nearest]).sum(axis=1), -steps[nearest], steps[nearest])[:, None] * base[nearest]
+    beside = np.clip((across * tangents[nearest]).sum(axis=1), -chords[nearest], chords[nearest])
+    across -= beside[:, None] * tangents[nearest]
     onward = (across * rim.onward[rim.beside]).sum(axis=1)
     return float(lengths @ np.linalg.norm(across, axis=1)), float(lengths @ onward)
 
