@@ -291,17 +291,20 @@ def jump_problem(triangles: IntrinsicMesh, pairs: FacePairs, slopes: Floats, gua
 
     `slopes`, (m, 3), are the values at corners of functions with gradient Y that are zero at centroids. Edges where
     `guarded`, (e,), is true get `SOURCE_CUT` times the weight.
+
+    With s and t the differences of `slopes` across an edge at its ends, and x that of the constants, the jumps at the
+    ends are ``|x + s| + |x + t| = |s − t| + 2 dist(x, [−max(s, t), −min(s, t)])``. The first term is in the `floor`.
     """
-    offsets = pairs.ends(slopes)
+    offsets = pairs.ends(slopes)  # (p, 2) s and t
     length = triangles.edge_lengths[pairs.faces[:, 0], pairs.sides[:, 0]]
     spread = np.abs(offsets[:, 1] - offsets[:, 0])  # κ |e|, whatever the constants are
     weights = length * np.exp(-spread / length) * pairs.shares
-    dear = np.where(guarded[pairs.edges], SOURCE_CUT, 1.0)
+    factors = np.where(guarded[pairs.edges], SOURCE_CUT, 1.0)
     return JumpProblem(
         pairs.faces,
         low=-offsets.max(axis=1),
         high=-offsets.min(axis=1),
-        weights=dear * weights,
+        weights=factors * weights,
         n_faces=triangles.n_faces,
         floor=float(weights @ spread),
     )

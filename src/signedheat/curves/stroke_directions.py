@@ -205,13 +205,14 @@ def likely_curves(ends: Floats, stroke: Ints) -> tuple[Ints, Floats]:
     `ends` are the first and last points of j curves in turn, (2 j, 3), and `stroke` is the stroke of each curve, (j,).
     Returns (k,) the likely curve of each stroke, and (g,) the total length of the gaps in each likely curve.
     """
-    j = len(stroke)
-    nearest = nearest_others(ends)
-    tails, heads = np.concatenate([nearest, np.stack([np.arange(j), j + stroke], axis=1)]).T
-    group = np.unique(connected_components(j + int(stroke.max()) + 1, tails, heads)[j:], return_inverse=True)[1].ravel()
+    j, k = len(stroke), int(stroke.max()) + 1
+    # a graph of j curves and k strokes: links between neighbouring curves, and between curves and their strokes
+    links = np.concatenate([nearest_others(ends), np.stack([np.arange(j), j + stroke], axis=1)])
+    stroke_components = connected_components(j + k, *links.T)[j:]
+    group = np.unique(stroke_components, return_inverse=True)[1].ravel()
     # a gap is from the end of a curve to the nearest beginning: the nearest end may be that of a copy
-    away = PointTree(ends[::2]).query(ends[1::2])[0]
-    return group.astype(np.int64), np.bincount(group[stroke], away).astype(np.float64)
+    gaps = PointTree(ends[::2]).query(ends[1::2])[0]
+    return group.astype(np.int64), np.bincount(group[stroke], gaps).astype(np.float64)
 
 
 def is_whole(triangles: IntrinsicMesh, part: CurveSegments) -> bool:

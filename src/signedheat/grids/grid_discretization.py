@@ -79,17 +79,18 @@ def fitting_spacing(
     That is, into `available` bytes. The work takes `per_node` bytes for each node, by default those of a distance, and
     `extra` bytes. A surface of the given area, in the units of the grid, adds more in space.
     """
-    base = memory_estimate(grid, 0.0, extra)
-    whole = memory_estimate(grid, per_node, extra) - base
-    spacing: Floats = grid.spacing * max((available - base) / whole, 1e-12) ** (-1.0 / grid.dimension)
-    per_node = whole / grid.n_nodes
+    without_nodes = memory_estimate(grid, 0.0, extra)
+    of_nodes = memory_estimate(grid, per_node, extra) - without_nodes
+    spacing: Floats = grid.spacing * max((available - without_nodes) / of_nodes, 1e-12) ** (-1.0 / grid.dimension)
+    per_node = of_nodes / grid.n_nodes
 
     def needed() -> float:
         """Return the estimated bytes with the present spacing."""
         nodes = float(np.prod(np.floor((grid.upper - grid.origin) / spacing) + 1))
-        return per_node * nodes + bytes_of_area(area, spacing, nodes) + base
+        return per_node * nodes + bytes_of_area(area, spacing, nodes) + without_nodes
 
-    while needed() > max(available, 2 * base):
+    # ends even where no spacing fits, since all else takes more than there is
+    while needed() > max(available, 2 * without_nodes):
         spacing *= 1.01
     return spacing
 

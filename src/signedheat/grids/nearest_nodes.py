@@ -85,13 +85,16 @@ def _fill(
     those of the search tree of f faces; `origin`, `steps` and `limits`, (3,), are the fields of the `Lattice`. The
     arrays to write to, `out_squares` and `out_faces`, (a, b, c), begin at node `window`, (3,). `eighths` is `EIGHTHS`.
     """
-    # candidates of each eighth at three levels of division, room for their distances, and the cubes still to divide
     leaves, parts = len(bounds) // 2, eighths.shape[1]
     most = BOXES_PER_LEAF * min(CROWDED_LEAVES, leaves) + 1
+    # candidates of each eighth at three levels of division, and their numbers
     faces, counts = np.empty((3, parts, most), dtype=np.int32), np.empty((3, parts), dtype=np.int64)
-    centres, best, which = np.empty((3, parts)), np.empty(parts), np.empty(parts, dtype=np.int64)
-    away, box, near = np.empty((most, 4, parts)), np.empty(9), np.empty(CROWDED_LEAVES, dtype=np.int64)
-    stack, cubes = np.empty(64, dtype=np.int64), np.empty((3 * parts, 5), dtype=np.int64)
+    # centres of the eighths of a cube, and what `_nearest` writes for them
+    centres, away = np.empty((3, parts)), np.empty((most, 4, parts))
+    least_squares, nearest = np.empty(parts), np.empty(parts, dtype=np.int64)
+    # the box of a block, the leaves near it, and a stack to find them; and the cubes still to divide
+    box, near, stack = np.empty(9), np.empty(CROWDED_LEAVES, dtype=np.int64), np.empty(64, dtype=np.int64)
+    cubes = np.empty((3 * parts, 5), dtype=np.int64)
     crowded = np.zeros(len(firsts), dtype=np.bool_)
     for b in range(len(firsts)):
         # centre and half widths of the block, the nearest point of its centre, and the leaves that can be nearer
@@ -123,11 +126,12 @@ def _fill(
                 centres[0, e] = origin[0] + (i + side * eighths[0, e] + 0.5 * (side - 1)) * steps[0]
                 centres[1, e] = origin[1] + (j + side * eighths[1, e] + 0.5 * (side - 1)) * steps[1]
                 centres[2, e] = origin[2] + (k + side * eighths[2, e] + 0.5 * (side - 1)) * steps[2]
-            _nearest(rows, faces[level, slot], counts[level, slot], centres, away, best, which)
+            candidates, n = faces[level, slot], counts[level, slot]
+            _nearest(rows, candidates, n, centres, away, least_squares, nearest)
             if side > 1:
                 # each eighth keeps the candidates that can be nearest to one of its nodes
-                candidates, n = faces[level, slot], counts[level, slot]
-                _divide(candidates, n, away, best, which, 0.5 * (side - 1) * steps, faces[level + 1], counts[level + 1])
+                widths, out, out_counts = 0.5 * (side - 1) * steps, faces[level + 1], counts[level + 1]
+                _divide(candidates, n, away, least_squares, nearest, widths, out, out_counts)
             # eighths on the lattice are divided next, or written if they are single nodes
             for e in range(parts):
                 p, q, r = i + side * eighths[0, e], j + side * eighths[1, e], k + side * eighths[2, e]
@@ -137,28 +141,34 @@ def _fill(
                         cubes[depth, 3], cubes[depth, 4] = level + 1, e
                         depth += 1
                     else:
-                        out_squares[p - window[0], q - window[1], r - window[2]] = best[e]
-                        out_faces[p - window[0], q - window[1], r - window[2]] = faces[level, slot, which[e]]
+                        out_squares[p - window[0], q - window[1], r - window[2]] = least_squares[e]
+                        out_faces[p - window[0], q - window[1], r - window[2]] = candidates[nearest[e]]
     return crowded
 
 
 @compiled
 def _nearest(
-    rows: Floats, faces: NDArray[np.int32], count: int, points: Floats, away: Floats, best: Floats, which: Ints
+    rows: Floats,
+    faces: NDArray[np.int32],
+    count: int,
+    points: Floats,
+    away: Floats,
+    least_squares: Floats,
+    nearest: Ints,
 ) -> None:
-    """Find the nearest of `count` faces for each of (3, e) places.
+    """Find the nearest of `count` faces for each of (3, e) points.
 
-    Write the squared distances and vectors from all faces to `away`, (count, 4, e), and the least square and the index
-    of its face to `best` and `which`, (e,).
+    Write the squared distances and vectors from all faces to `away`, (count, 4, e), and the least squared distance and
+    the index of its face among the `count` to `least_squares` and `nearest`, (e,).
     """
-    for e in range(len(best)):
-        best[e], which[e] = np.inf, 0
+    for e in range(len(nearest)):
+        least_squares[e], nearest[e] = np.inf, 0
     for c in range(count):
         away_from_triangle(rows, np.int64(faces[c]), points, c, away)
-        for e in range(len(best)):
-            nearer = away[c, 0, e] < best[e]
-            best[e] = away[c, 0, e] if nearer else best[e]
-            which[e] = c if nearer else which[e]
+        for e in range(len(nearest)):
+            nearer = away[c, 0, e] < least_squares[e]
+            least_squares[e] = away[c, 0, e] if nearer else least_squares[e]
+            nearest[e] = c if nearer else nearest[e]
 
 
 @compiled
@@ -166,36 +176,37 @@ def _divide(
     faces: NDArray[np.int32],
     count: int,
     away: Floats,
-    best: Floats,
-    which: Ints,
+    least_squares: Floats,
+    nearest: Ints,
     half: Floats,
     out: NDArray[np.int32],
     counts: Ints,
 ) -> None:
-    """Write the faces that can be nearest in each of eight boxes with half widths `half` to `out`, and their numbers.
+    """Write the faces that can be nearest in each of eight boxes with half widths `half`, (3,), to `out`, (8, f).
 
-    `away`, `best` and `which` are what `_nearest` found for the centres of the boxes. The bound holds since squared
-    distance lies above its tangent planes.
+    Their numbers are written to `counts`, (8,). `away`, `least_squares` and `nearest` are what `_nearest` found for the
+    centres of the boxes. The bound holds since squared distance lies above its tangent planes.
     """
-    nearest_vectors, can = np.empty((4, len(best))), np.empty(len(best), dtype=np.int64)
-    for e in range(len(best)):
+    # (4, 8): the square that a candidate must not exceed, and the vectors of the faces nearest to the centres
+    to_beat, can = np.empty((4, len(nearest))), np.empty(len(nearest), dtype=np.int64)
+    for e in range(len(nearest)):
         counts[e] = 0
         for d in range(4):
-            nearest_vectors[d, e] = away[which[e], d, e]
-        nearest_vectors[0, e] = (
-            best[e] * (1.0 + SQUARE_ROUNDING) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
+            to_beat[d, e] = away[nearest[e], d, e]
+        to_beat[0, e] = (
+            least_squares[e] * (1.0 + SQUARE_ROUNDING) + half[0] * half[0] + half[1] * half[1] + half[2] * half[2]
         )
     a, b, c = 2.0 * half[0], 2.0 * half[1], 2.0 * half[2]
-    for at in range(count):
+    for k in range(count):
         total = 0
-        for e in range(len(best)):
-            low = away[at, 0, e] - a * abs(away[at, 1, e] - nearest_vectors[1, e])
-            low -= b * abs(away[at, 2, e] - nearest_vectors[2, e]) + c * abs(away[at, 3, e] - nearest_vectors[3, e])
-            can[e] = 1 if low <= nearest_vectors[0, e] else 0
+        for e in range(len(nearest)):
+            low = away[k, 0, e] - a * abs(away[k, 1, e] - to_beat[1, e])
+            low -= b * abs(away[k, 2, e] - to_beat[2, e]) + c * abs(away[k, 3, e] - to_beat[3, e])
+            can[e] = 1 if low <= to_beat[0, e] else 0
             total += can[e]
         if total > 0:
-            for e in range(len(best)):
-                out[e, counts[e]] = faces[at]
+            for e in range(len(nearest)):
+                out[e, counts[e]] = faces[k]
                 counts[e] += can[e]
 
 

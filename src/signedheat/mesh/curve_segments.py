@@ -264,45 +264,48 @@ def given_directions(
 def carried_left(triangles: IntrinsicMesh, faces: Ints, edges: Ints, lengths: Floats) -> Floats:
     """Return (k,) signs, ±1, for k segments of a curve, that make their left sides agree on a nonoriented mesh.
 
-    The left side of a segment is that in the layout of its face, or of the first face of its edge. The sign is −1 where
-    the orientation of this face differs from that of the faces along most of the curve's length.
+    Segments have (k,) `lengths`, and lie in `faces`, (k,), along `edges`, (k,), or none where these are −1. The left
+    side of a segment is that in the layout of its face, or of the first face of its edge. The sign is −1 where the
+    orientation of this face differs from that of the faces along most of the curve's length.
     """
-    telling, links, number = _agreement_around(triangles, faces, edges)
-    signs = signs_of(links, int(number.max(initial=-1)) + 1)[number[telling]]
-    most = float(np.sign(signs @ lengths)) or signs[0]
-    return signs * most
+    deciding, links, nodes = _agreement_around(triangles, faces, edges)
+    signs = signs_of(links, int(nodes.max(initial=-1)) + 1)[nodes[deciding]]
+    sign_of_most = float(np.sign(signs @ lengths)) or signs[0]
+    return signs * sign_of_most
 
 
 def loses_orientation(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> bool:
     """Whether the faces around a curve cannot be oriented consistently, as along the middle of a Möbius strip."""
-    _, links, number = _agreement_around(triangles, faces, edges)
+    _, links, nodes = _agreement_around(triangles, faces, edges)
     of_two = np.abs(links.weights) == 1  # of three faces around an edge two cannot agree
     links = Links(links.tails[of_two], links.heads[of_two], links.weights[of_two])
-    signs = signs_of(links, int(number.max(initial=-1)) + 1)
+    signs = signs_of(links, int(nodes.max(initial=-1)) + 1)
     return bool((signs[links.tails] * signs[links.heads] * links.weights < 0).any())
 
 
 def _agreement_around(triangles: IntrinsicMesh, faces: Ints, edges: Ints) -> tuple[Ints, Links, Ints]:
-    """Return a graph of the orientations of the faces near a curve.
+    """Return a graph of the orientations of the faces near a curve of k segments.
 
-    These are (k,) the face that decides which side of each segment is left, weighted links between neighbouring faces,
-    negative where their orientations disagree, and (m,) the node of each face in the graph, valid near the curve.
+    `faces`, (k,), and `edges`, (k,), are the face of each segment and the edge that it runs along, or −1. Returns (k,)
+    the face that decides which side of each segment is left, links between neighbouring faces, negative where their
+    orientations disagree, and (m,) the node of each face in the graph, valid for faces that share a vertex with these.
     """
     first = triangles.first_halfedges
     first_faces = np.zeros(triangles.n_edges, dtype=np.int64)
     first_faces[triangles.edges.face_edges.ravel()[first]] = first // 3
-    telling = np.where(edges < 0, faces, first_faces[edges])
+    deciding = np.where(edges < 0, faces, first_faces[edges])
     corners = triangles.corner_vertices
-    touched = mask_of(triangles.n_vertices, corners[np.append(faces, telling)])
-    around = np.asarray(touched[corners].any(axis=1))
-    number = np.cumsum(around) - 1
+    touched_vertices = mask_of(triangles.n_vertices, corners[np.append(faces, deciding)])
+    is_near = np.asarray(touched_vertices[corners].any(axis=1))
+    nodes = np.cumsum(is_near) - 1
     pairs = face_pairs(triangles)
     (first_of, second_of), sides = pairs.faces.T, pairs.sides
+    # faces with the same orientation run along their common edge in opposite directions
     forward = triangles.edges.forward
     agree = np.where(forward[first_of, sides[:, 0]] != forward[second_of, sides[:, 1]], 1.0, -1.0)
-    near = around[first_of] & around[second_of]
-    links = Links(number[first_of[near]], number[second_of[near]], agree[near] * pairs.shares[near])
-    return telling, links, number
+    both = is_near[first_of] & is_near[second_of]
+    links = Links(nodes[first_of[both]], nodes[second_of[both]], agree[both] * pairs.shares[both])
+    return deciding, links, nodes
 
 
 def in_layout(triangles: IntrinsicMesh, positions: Floats, faces: Ints, vectors: Floats) -> Complexes:

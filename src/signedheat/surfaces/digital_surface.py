@@ -360,22 +360,23 @@ def corrected_normals(volume: Bools, surfels: Surfels, spacing: Floats, radius: 
 def separated_edges(edges: EdgeTable, surfels: Surfels) -> EdgeTable:
     """Replace each edge along which two voxels touch by two, one for the surfels that face each voxel outside.
 
-    Triangles are four per surfel; the first side of each is that of the surfel.
+    Triangles are four per surfel; the first side of each is that of the surfel. Of the two edges, one keeps the id of
+    the edge that they replace.
     """
-    triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)
-    surfel = triangles // 4
+    triangles = np.flatnonzero(edges.face_counts[edges.face_edges[:, 0]] > 2)  # those at an edge of two voxels
+    surfel, old_ids = triangles // 4, edges.face_edges[triangles, 0]
     outside = (surfels.voxels + surfels.outward)[surfel]
-    key = np.column_stack([edges.face_edges[triangles, 0], outside])
-    _, first, pair = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    kept = np.isin(first, np.unique(edges.face_edges[triangles, 0], return_index=True)[1])
+    _, first, group = np.unique(np.column_stack([old_ids, outside]), axis=0, return_index=True, return_inverse=True)
+    group = group.ravel()  # of the triangles; each group has an edge of its own
+    kept = np.isin(first, np.unique(old_ids, return_index=True)[1])
     n_edges = len(edges.vertices)
-    ids = np.where(kept, key[first, 0], n_edges + np.cumsum(~kept) - 1)
+    group_ids = np.where(kept, old_ids[first], n_edges + np.cumsum(~kept) - 1)
 
     leading = triangles[first[~kept]]  # the first triangle of each new edge determines its direction
     direction = edges.vertices[edges.face_edges[leading, 0]]
     direction = np.where(edges.forward[leading, 0, None], direction, direction[:, ::-1])
-    of_faces, forward = edges.face_edges.copy(), edges.forward.copy()
-    of_faces[triangles, 0] = ids[pair.ravel()]
-    renamed = triangles[~kept[pair.ravel()]]
-    forward[renamed, 0] ^= ~edges.forward[leading, 0][of_faces[renamed, 0] - n_edges]
-    return EdgeTable(np.concatenate([edges.vertices, direction]), of_faces, forward)
+    face_edges, forward = edges.face_edges.copy(), edges.forward.copy()
+    face_edges[triangles, 0] = group_ids[group]
+    renamed = triangles[~kept[group]]
+    forward[renamed, 0] ^= ~edges.forward[leading, 0][face_edges[renamed, 0] - n_edges]
+    return EdgeTable(np.concatenate([edges.vertices, direction]), face_edges, forward)

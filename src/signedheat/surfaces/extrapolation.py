@@ -85,7 +85,8 @@ def default_diffusion(discretization: Discretization) -> Diffusion:
 def lowered_for_times(discretization: Discretization, sources: Sequence[Any], diffusion: Diffusion) -> list[SourceTerm]:
     """Lower the sources for a diffusion time, and once more for the parts of a surface in which curves end.
 
-    With `Extrapolated`, the result is a source for all parts, one for those parts, or both in this order.
+    With `Extrapolated` there are one or two results: the source for all parts, with directions to be extrapolated, and
+    the source with a third of the time, for the parts in which curves end. Either is left out if no part needs it.
     """
     if not isinstance(diffusion, Extrapolated):
         return [discretization.lower(sources, diffusion)]
@@ -95,7 +96,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
             "directions are extrapolated in time on surfaces only", remedy="pass a number", element="diffusion"
         )
     at_ends = replace(source, time=source.time / Extrapolated.tau)  # by default τ is then 1, as in the paper
-    if all(source.ending[part.nodes.faces].all() for part in source.parts):  # no part has closed curves alone
+    if all(source.ending[part.nodes.faces].all() for part in source.parts):  # curves end in every part with a source
         return [at_ends]
     everywhere = replace(source, extrapolated=True)
     return [everywhere, at_ends] if source.ending.any() else [everywhere]

@@ -213,9 +213,10 @@ def list_face(g: Gluing, agenda: Agenda, f: int, goal: Goal) -> None:
     bad, h = is_bad(g, f, goal)
     if agenda.listed[f] or not bad:
         return
+    # n/d is tan²(α/2) of the angle α opposite side h; so this is 4 · circumradius, which is |h| / (2 sin α)
     n, d = tangent_at(g, preceding(h))
-    radius = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
-    bin_index = min(max(BAD_FACE_LISTS // 2 + int(2.0 * np.log2(min(max(radius, 1e-30), 1e30))), 0), BAD_FACE_LISTS - 1)
+    size = g.length[g.edge[h]] * (n + d) / np.sqrt(n * d) if n > 0.0 and d > 0.0 else np.inf
+    bin_index = min(max(BAD_FACE_LISTS // 2 + int(2.0 * np.log2(min(max(size, 1e-30), 1e30))), 0), BAD_FACE_LISTS - 1)
     agenda.next_face[f] = agenda.bins[bin_index]
     agenda.bins[bin_index] = f
     agenda.listed[f] = True

@@ -64,18 +64,19 @@ def local_triangulations(
 ) -> LocalTriangulations:
     """Triangulate (n, 3) points in O(n log n) time, given (n, 3) unit normals by which sides are told apart.
 
-    Each component of the result is oriented like most of the normals `given`, or of `normals` without these.
+    Each component of the result is oriented like most of the normals `given`, (n, 3), or of `normals` without these.
     """
     planes = TangentPlanes.of(points, normals, n_neighbors)
     faces, candidates = joined_triangles(planes)
     alone = islands(planes, faces)
-    if alone.any():  # their normals contradict the points nearby
+    if alone.any():  # their normals contradict those of the points nearby, so they are taken for inverted
         planes = TangentPlanes.of(points, np.where(alone[:, None], -normals, normals), n_neighbors)
         faces, candidates = joined_triangles(planes)
     if len(faces) == 0:
         return LocalTriangulations(faces, planes.normals)
     faces = split_at_points_left(points, faces, candidates)
-    oriented = planes.normals * aligned(planes.normals, faces, normals, normals if given is None else given)[:, None]
+    signs = aligned(planes.normals, faces, normals, normals if given is None else given)
+    oriented = planes.normals * signs[:, None]
     faces = facing(planes, oriented, faces)
     return LocalTriangulations(np.concatenate([faces, hole_fillings(points, oriented, faces)]), oriented)
 

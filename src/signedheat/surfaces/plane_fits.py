@@ -59,13 +59,13 @@ def fit_planes(points: Floats, n_neighbors: int | None = None) -> PlaneFits:
     """Fit a plane near each of (n, 3) distinct points.
 
     Points are noisy if `n_neighbors` is given, and planes are fitted to this number of neighbours. Otherwise points lie
-    on the surface, and planes are fitted to few.
+    on the surface, and planes are fitted to at most `CLEAN_NEIGHBORS`. Neighbours far above or below are left out.
     """
     tree = PointTree(points)
     noisy = n_neighbors is not None
     size = n_neighbors or min(CLEAN_NEIGHBORS, len(points) - 1)
-    heights = NOISY_HEIGHTS if noisy else CLEAN_HEIGHTS
-    axes, centers, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, heights, on_surface=not noisy)
+    limits = NOISY_HEIGHTS if noisy else CLEAN_HEIGHTS
+    axes, centers, reaches, _ = planes_near(points, tree, np.arange(len(points)), size, limits, on_surface=not noisy)
     projected = points - ((points - centers) * axes).sum(axis=1, keepdims=True) * axes if noisy else points
     return PlaneFits(axes, projected, reaches, size, noisy)
 

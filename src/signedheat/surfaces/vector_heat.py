@@ -60,10 +60,10 @@ class VectorHeat:
         """
         shape = self.triangles.n_edges, len(sources), 1 + changes
         starts = np.zeros(shape, dtype=np.complex128, order="F")  # each column is solved for, and read, at once
-        for k, source in enumerate(sources):
+        for k, source in enumerate(sources):  # scaled so that |X| is at most about 1; only directions matter
             starts[source.indices, k, 0] = scaled(source.data, float(self.mass.min()))[0]
-        together = self._solve(starts)
-        return [[s.values for s in self._restarted(starts[:, k], together[:, k])] for k in range(len(sources))]
+        first = self._solve(starts)
+        return [[stage.values for stage in self._restarted(starts[:, k], first[:, k])] for k in range(len(sources))]
 
     def _restarted(self, start: Complexes, values: Complexes) -> list[Stage]:
         """Return the stages of one source, from its (n_edges, c) right-hand sides and the first solutions."""

@@ -159,17 +159,18 @@ def rasterize(corners: Floats, values: Floats, width: int, height: int) -> tuple
 def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -> None:
     """Write the depth and number of the nearest triangle at each pixel into `depth` and `face`, (height · width,).
 
+    `corners`, (m, 3, 3), are column, row and depth of the corners of triangles, in pixels; depths grow towards the eye.
     In each row a triangle covers its left end and not its right, so that each pixel is in one of two neighbours.
     """
     for t in range(len(corners)):
         ax, ay, az = corners[t, 0, 0], corners[t, 0, 1], corners[t, 0, 2]
         bx, by, bz = corners[t, 1, 0], corners[t, 1, 1], corners[t, 1, 2]
         cx, cy, cz = corners[t, 2, 0], corners[t, 2, 1], corners[t, 2, 2]
-        double = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if double == 0.0:
+        twice_area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if twice_area == 0.0:
             continue
-        slope_x = ((bz - az) * (cy - ay) - (cz - az) * (by - ay)) / double
-        slope_y = ((cz - az) * (bx - ax) - (bz - az) * (cx - ax)) / double
+        slope_x = ((bz - az) * (cy - ay) - (cz - az) * (by - ay)) / twice_area
+        slope_y = ((cz - az) * (bx - ax) - (bz - az) * (cx - ax)) / twice_area
         least, most = min(az, bz, cz), max(az, bz, cz)
         for row in range(max(np.int64(np.ceil(min(ay, by, cy))), 0), min(np.int64(np.ceil(max(ay, by, cy))), height)):
             left, right = np.inf, -np.inf
@@ -185,6 +186,7 @@ def _draw(corners: Floats, width: int, height: int, depth: Floats, face: Ints) -
             if not left < right:
                 continue
             for column in range(max(np.int64(np.ceil(left)), 0), min(np.int64(np.ceil(right)), width)):
+                # the plane of a triangle seen edge-on is steep, so its depth is bounded by those of the corners
                 z = min(max(az + slope_x * (column - ax) + slope_y * (row - ay), least), most)
                 if z >= depth[row * width + column]:
                     depth[row * width + column], face[row * width + column] = z, t
