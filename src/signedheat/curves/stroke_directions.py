@@ -86,11 +86,11 @@ class CurvePieces:
         places = [domain.positions(curve) for curve in listed]
         order = order_in_space(places)
         listed = [listed[k] for k in order]
-        each = [part for (part,) in surface.segments([[curve] for curve in listed])]
+        segments = [part for (part,) in surface.segments([[curve] for curve in listed])]
         # curves with normals are neither joined nor taken for copies, since their normals may disagree
         by_points = np.array([curve.normals is None for curve in listed])
-        first, copy = without_copies(each, by_points)
-        parts, stroke = joined_end_to_end([each[k] for k in first], by_points[first])
+        first, copy = without_copies(segments, by_points)  # of curve i, there is one copy: first[copy[i]]
+        parts, stroke = joined_end_to_end([segments[k] for k in first], by_points[first])
         is_piece = np.array([not is_whole(surface.triangles, part) for part in parts])
         movable = np.array([may_turn(surface.triangles, part) for part in parts])
         if not movable.any() or (len(parts) == 1 and not is_piece[0]):

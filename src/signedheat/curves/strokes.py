@@ -94,7 +94,8 @@ def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids)
     from the node to the sink. `residual` and `pull` are overwritten.
     """
     n, now = len(pull), 1
-    tree = np.sign(pull).astype(np.int8)  # 1 in the source's tree, −1 in the sink's
+    tree = np.sign(pull).astype(np.int8)  # 1 in the source's tree, −1 in the sink's, 0 in neither
+    # of each node: the arc to its parent, its depth in the tree, and when that was last correct, by the clock `now`
     parent, far, stamp = np.full(n, FREE), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     queue, orphans, waiting = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
     first = count = 0  # of the queue, which is a ring
@@ -153,8 +154,9 @@ def source_side(starts: Ids, heads: Ids, reverse: Ids, residual: Ids, pull: Ids)
 def _augment(heads: Ids, reverse: Ids, residual: Ids, pull: Ids, parent: Ids, meeting: int, orphans: Ids) -> int:
     """Push as much flow as possible along the path through `meeting`, an arc from the source's tree to the sink's.
 
-    Nodes whose arc to the parent is saturated by it are marked as `ORPHAN` and written to `orphans`. Returns their
-    number.
+    Nodes whose arc to the parent is saturated by it are marked as `ORPHAN` and written to `orphans`, (n,). Returns
+    their number. `parent`, (n,), has the arc from each node to its parent in a tree; all other arrays are those of
+    `source_side`, and `residual` and `pull` are reduced by the flow.
     """
     least = residual[meeting]
     for end in range(2):
@@ -203,6 +205,7 @@ def _adopted(
     """Find a new parent for the orphan p among its neighbours, and return whether there is one.
 
     A parent must be connected to the terminal of the same tree. Of several, the one nearest to the terminal is chosen.
+    The arrays are those of `source_side`: depths `far` are correct for nodes with the `stamp` `now`.
     """
     best, nearest = ORPHAN, np.int64(1) << 60
     for a in range(starts[p], starts[p + 1]):

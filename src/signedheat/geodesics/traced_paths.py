@@ -169,19 +169,20 @@ def _through_side(faces: Faces, search: Search, halfedge: int, x: complex) -> tu
     a, b = faces.positions[face, side], faces.positions[face, (side + 1) % 3]
     ahead = faces.forward[face, side]
     origin, unit = (a, (b - a) / length) if ahead else (b, (a - b) / length)
-    local = (x - origin) * unit.conjugate()
+    local = (x - origin) * unit.conjugate()  # in the frame of the edge, whose tail is at 0
     along, up = local.real, abs(local.imag)
     best, crossing, row = np.inf, 0.0, search.settled[halfedge]
     while row >= 0:
         w = search.windows[row]
         row = search.following[row]
+        # the straight line from x along the beam, or to the centre of the wave, crosses the edge at this position
         if w[KIND] == BEAM:
-            at = along - w[P] / w[Q] * up if w[Q] > 0.0 else along
+            position = along - w[P] / w[Q] * up if w[Q] > 0.0 else along
         else:
-            at = w[P] + (along - w[P]) * w[Q] / (w[Q] - up) if w[Q] < up else w[P]
-        at = min(max(at, w[S0]), w[S1])
-        away = arrival(w, at, 0.0) + np.sqrt((along - at) ** 2 + up**2)
-        if away < best:
-            best, crossing = away, at
+            position = w[P] + (along - w[P]) * w[Q] / (w[Q] - up) if w[Q] < up else w[P]
+        position = min(max(position, w[S0]), w[S1])
+        distance = arrival(w, position, 0.0) + np.sqrt((along - position) ** 2 + up**2)
+        if distance < best:
+            best, crossing = distance, position
     share = crossing / length
     return best, share if ahead else 1.0 - share

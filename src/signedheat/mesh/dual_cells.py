@@ -113,7 +113,7 @@ def dual_cells(
     ``inside(points)`` returns (n,) bool, true where (n, 3) points, in coordinates of nodes, are inside.
     """
     positions, edges, rows, sides = around
-    ways = np.zeros((len(positions), 6), dtype=np.bool_)
+    ways = np.zeros((len(positions), 6), dtype=np.bool_)  # to link crossed edges at each face: see `_pieces_of_cell`
     cells, faces = np.nonzero(_crossed_faces(edges) == 4)
     across, side = faces // 2, faces % 2
     first = positions[cells]
@@ -127,8 +127,9 @@ def dual_cells(
     while True:
         ways[cells[order], faces[order]] = way[:, None]
         pieces, counts = _pieces(edges, ways)
-        linked = pieces[cells[:, None], _face_edges(faces)]
-        double = np.flatnonzero((linked == linked[:, :1]).all(axis=1)[order].all(axis=1))
+        pieces_at_faces = pieces[cells[:, None], _face_edges(faces)]
+        # both links at a face belong to one piece in both cells: they get the other way
+        double = np.flatnonzero((pieces_at_faces == pieces_at_faces[:, :1]).all(axis=1)[order].all(axis=1))
         if not len(double):
             break
         # one face of a cell at a time: each change divides the pieces of both cells, but two may join them again
@@ -286,29 +287,33 @@ def separate_triangles(cells: DualCells, crossings: Crossings, choices: Floats) 
 def _safe(flat: Floats, height: Floats) -> tuple[Bools, Floats]:
     """Return (n,) whether the diagonal from corner 0 to 2 stays within the tetrahedra of a crossed edge.
 
-    `flat`, (n, 4, 2), and `height`, (n, 4), are coordinates of corners across and along the edge, in cells. Also
-    returns (n,) the height at which the triangles along the diagonal cross the edge.
+    `flat`, (n, 4, 2), and `height`, (n, 4), are coordinates of corners across and along the edge, in cells. The edge is
+    at the origin, with heights from 0 to 1. Also returns (n,) the height at which the triangles along the diagonal
+    cross the edge.
     """
     p, r = flat[:, 0], flat[:, 2]
-    side = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner
+    is_left = _cross(p, r) > 0  # the origin is to the left of the diagonal, with the fourth corner
     rows = np.arange(len(flat))
-    with_origin, left_corner = np.where(side, 3, 1), np.where(side, 1, 3)
-    s, q = flat[rows, with_origin], flat[rows, left_corner]
+    with_origin, opposite = np.where(is_left, 3, 1), np.where(is_left, 1, 3)
+    s, q = flat[rows, with_origin], flat[rows, opposite]
     # barycentric coordinates of the origin in the triangle p, r, s
     weights = np.stack([_cross(r, s), _cross(s, p), _cross(p, r)], axis=1)
     total = weights.sum(axis=1)
     total = np.where(np.abs(total) > 1e-300, total, 1e-300)
     heights = np.stack([height[:, 0], height[:, 2], height[rows, with_origin]], axis=1)
     crossed_at = (weights * heights).sum(axis=1) / total
-    # where the diagonal, from p to r, passes the line from the origin to q
-    along = _cross(p - r, q)
-    share = _cross(p, q) / np.where(np.abs(along) > 1e-300, along, 1e-300)
+    # where the diagonal, from p to r, passes the line from the origin to q: the shares of both, and its height
+    divisor = _cross(p - r, q)
+    share = _cross(p, q) / np.where(np.abs(divisor) > 1e-300, divisor, 1e-300)
     passing = p + share[:, None] * (r - p)
-    reach = (passing * q).sum(axis=1) / np.maximum((q * q).sum(axis=1), 1e-300)
-    level = height[:, 0] + share * (height[:, 2] - height[:, 0])
-    last = height[rows, left_corner]
-    safe = (crossed_at > DIAGONAL_CLEARANCE) & (crossed_at < 1 - DIAGONAL_CLEARANCE) & (reach < 1 - DIAGONAL_CLEARANCE)
-    safe &= (level > reach * last + DIAGONAL_CLEARANCE) & (level < (1 - reach) + reach * last - DIAGONAL_CLEARANCE)
+    share_to_q = (passing * q).sum(axis=1) / np.maximum((q * q).sum(axis=1), 1e-300)
+    passing_height = height[:, 0] + share * (height[:, 2] - height[:, 0])
+    # there the triangle of the edge and q reaches from one to the other of these heights
+    bottom = share_to_q * height[rows, opposite]
+    top = (1 - share_to_q) + bottom
+    safe = (crossed_at > DIAGONAL_CLEARANCE) & (crossed_at < 1 - DIAGONAL_CLEARANCE)
+    safe &= share_to_q < 1 - DIAGONAL_CLEARANCE
+    safe &= (passing_height > bottom + DIAGONAL_CLEARANCE) & (passing_height < top - DIAGONAL_CLEARANCE)
     return safe, crossed_at
 
 

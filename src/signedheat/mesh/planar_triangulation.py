@@ -226,7 +226,8 @@ def _with_room(mesh: Planar) -> Planar:
 def _flattened(points: Floats, members: Ints, corners: Ints) -> Floats:
     """Project the points of a face along the axis nearest to its normal; return (n, 2) counter-clockwise coordinates.
 
-    They are relative to the first corner. `members` and `corners` are those of the face, as in `triangulate_faces`.
+    They are relative to the first corner. `members` are the ids of the points, and `corners` the indices among these of
+    the second and third corner.
     """
     a, b, c = members[0], members[corners[0]], members[corners[1]]
     normal = np.empty(3)
@@ -261,7 +262,8 @@ def _length(x: Floats, a: int, b: int) -> float:
 def _rim(x: Floats, corners: Ints, flat: float, near: float) -> Planar:
     """Start a triangulation of a triangle, with the points on its boundary only.
 
-    `x` are all (n, 2) points, and `corners` is a row as in `triangulate_faces`.
+    `x` are all (n, 2) points, first those on the boundary, in order from the first corner. `corners` are the indices of
+    the second and third corner, and the number of points on the boundary. `flat` and `near` are those of `Planar`.
     """
     n, rim = len(x), corners[2]
     count = 2 * n - rim - 2
@@ -517,7 +519,7 @@ def _fix(mesh: Planar, a: int, b: int) -> None:
 
 @compiled
 def _aim(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> tuple[int, int, int]:
-    """Find where a segment from `begin` to b continues after its point a.
+    """Find where a segment from `begin` to b continues after its point a, with edges up to ``done[0]`` so far.
 
     Returns the triangle at a that it enters, the edge of this by which it leaves, and the neighbour of a that it meets
     first, or −1. The triangle is −1 if there is none.
@@ -562,7 +564,10 @@ def _meets(mesh: Planar, begin: int, done: Floats, b: int, i: int) -> bool:
 
 @compiled
 def _beside(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> int:
-    """Return the neighbour of a through which a segment to b continues if rounding prevents flips, or −1."""
+    """Return the neighbour of a through which a segment to b continues if rounding prevents flips, or −1.
+
+    The segment runs from `begin`, and has edges up to ``done[0]`` so far, see `_share`.
+    """
     x = mesh.x
     t, k, goal = _aim(mesh, begin, done, a, b)
     if goal >= 0 or t < 0:
@@ -584,9 +589,9 @@ def _place(tri: Ints, t: int, a: int) -> int:
 def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: int) -> int:
     """Flip the edges that a segment crosses, the first of which is edge k of triangle t.
 
-    The segment runs from `begin` to b, and has edges up to its point a. Returns the point of the segment to which there
-    is now an edge from a, or −1 if rounding prevents it. If the segment crosses another, a point is added there,
-    nothing is flipped, and a is returned.
+    The segment runs from `begin` to b, and has edges up to its point a, which is ``done[0]`` along it. Returns the
+    point of the segment to which there is now an edge from a, or −1 if rounding prevents it. If the segment crosses
+    another, a point is added there, nothing is flipped, and a is returned.
     """
     x, tri, adj, fixed, flat = mesh.x, mesh.tri, mesh.adj, mesh.fixed, mesh.flat
     tails, heads = [tri[t, k]], [tri[t, (k + 1) % 3]]

@@ -198,9 +198,10 @@ def _overlapping(corners: Floats, ids: Ints, slacks: Floats, f: int, g: int, way
 def _beside(corners: Floats, f: int, g: int, i: int, j: int) -> bool:
     """Return whether a certain plane separates triangles f and g with one common corner, number i of f and j of g.
 
-    Its normal is the difference of the unit vectors from that corner to the midpoints of the opposite sides.
+    Its normal is the difference of the unit vectors from that corner to the midpoints of the opposite sides. A row of
+    `corners` has the nine coordinates of a triangle.
     """
-    first, second = 0.0, 0.0
+    first, second = 0.0, 0.0  # of twice the vectors to the midpoints, the squared lengths, and then their inverses
     a, b, c, d = 3 * ((i + 1) % 3), 3 * ((i + 2) % 3), 3 * ((j + 1) % 3), 3 * ((j + 2) % 3)
     for e in range(3):
         o = corners[f, 3 * i + e]
@@ -208,13 +209,15 @@ def _beside(corners: Floats, f: int, g: int, i: int, j: int) -> bool:
         second += (corners[g, c + e] - o + corners[g, d + e] - o) ** 2
     if not (first > 0.0 and second > 0.0):
         return False
-    first, second, u, v, w, x = 1.0 / np.sqrt(first), 1.0 / np.sqrt(second), 0.0, 0.0, 0.0, 0.0
+    first, second = 1.0 / np.sqrt(first), 1.0 / np.sqrt(second)
+    height_a, height_b, height_c, height_d = 0.0, 0.0, 0.0, 0.0  # of the other corners above the plane
     for e in range(3):
         o = corners[f, 3 * i + e]
         p, q, r, s = corners[f, a + e] - o, corners[f, b + e] - o, corners[g, c + e] - o, corners[g, d + e] - o
-        way = first * (p + q) - second * (r + s)
-        u, v, w, x = u + way * p, v + way * q, w + way * r, x + way * s
-    return u >= 0.0 and v >= 0.0 and w <= 0.0 and x <= 0.0
+        normal = first * (p + q) - second * (r + s)
+        height_a, height_b = height_a + normal * p, height_b + normal * q
+        height_c, height_d = height_c + normal * r, height_d + normal * s
+    return height_a >= 0.0 and height_b >= 0.0 and height_c <= 0.0 and height_d <= 0.0
 
 
 @compiled

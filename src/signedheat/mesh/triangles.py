@@ -141,30 +141,30 @@ def gradients_along(sides: Floats, rises: Floats) -> Floats:
 def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[Floats, Bools]:
     """Return (p,) areas of polygons, and (p,) whether they are degenerate.
 
-    Polygon f has the corners offsets[f] to offsets[f + 1] − 1. It is degenerate without area, up to rounding, or with a
-    repeated vertex.
+    Polygon f has the corners offsets[f] to offsets[f + 1] − 1 of `corners`, ids of (n, 3) vertices. It is degenerate
+    without area, up to rounding, or with a repeated vertex.
     """
     n = len(offsets) - 1
     areas, degenerate = np.empty(n), np.zeros(n, dtype=np.bool_)
-    seen = np.full(len(vertices), -1)
-    middle, away, after, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    last_polygon = np.full(len(vertices), -1)  # that each vertex was found in
+    middle, to_tail, to_head, normal = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for f in range(n):
         middle[:], normal[:] = 0.0, 0.0
-        largest, radius = 0.0, 0.0
+        largest, radius = 0.0, 0.0  # absolute coordinates, of the corners and relative to their middle
         for c in range(offsets[f], offsets[f + 1]):
             v = corners[c]
-            degenerate[f] |= seen[v] == f
-            seen[v] = f
+            degenerate[f] |= last_polygon[v] == f
+            last_polygon[v] = f
             for d in range(3):
                 middle[d] += vertices[v, d] / (offsets[f + 1] - offsets[f])
                 largest = max(largest, abs(vertices[v, d]))
         for c in range(offsets[f], offsets[f + 1]):
             tail, head = corners[c], corners[c + 1 if c + 1 < offsets[f + 1] else offsets[f]]
             for d in range(3):
-                away[d], after[d] = vertices[tail, d] - middle[d], vertices[head, d] - middle[d]
-                radius = max(radius, abs(away[d]))
-            for d in range(3):
-                normal[d] += away[d - 2] * after[d - 1] - away[d - 1] * after[d - 2]  # a cross product, cyclically
+                to_tail[d], to_head[d] = vertices[tail, d] - middle[d], vertices[head, d] - middle[d]
+                radius = max(radius, abs(to_tail[d]))
+            for d in range(3):  # a cross product, cyclically
+                normal[d] += to_tail[d - 2] * to_head[d - 1] - to_tail[d - 1] * to_head[d - 2]
         areas[f] = 0.5 * np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
         degenerate[f] |= areas[f] <= 4.0 * 2.0**-52 * radius * largest  # 4 units in the last place
     return areas, degenerate

@@ -109,41 +109,56 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     """
     n, loop = lid.n_rim, lid.vertices[: lid.n_rim]
     reach = STRIP_WIDTH * width
-    steps = side_lengths(loop)
-    m = max(1, min(n // 4, round(reach / steps.mean())))
-    along = unit(np.roll(loop, -m, axis=0) - np.roll(loop, m, axis=0))
+    window = max(1, min(n // 4, round(reach / side_lengths(loop).mean())))  # points on each side over which to smooth
+    tangents = unit(np.roll(loop, -window, axis=0) - np.roll(loop, window, axis=0))
+    normals, slopes, frames, enough = _normals_at_rim(samples, loop, tangents, patches, reach)
+    outwards = unit(np.cross(normals, tangents))
+    bends = width * (slopes[:, 0] * outwards).sum(axis=1)  # k W
+    needed = 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)  # 2 sin β
+    less, more = np.minimum(np.abs(bends), np.abs(needed)), np.maximum(np.abs(bends), np.abs(needed))
+    ratio = np.sign(bends * needed) * less / np.maximum(more, ANGLE_ROUNDING)
+    ratio *= enough
+    # 0 on threads, which bend both ways
+    consistency = max(float(ratio.sum()), 0.0) / max(float(np.abs(ratio).sum()), 1e-300)
+    weights = consistency * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
+    # no more curvature than the lid needs to cross the opening
+    fits = np.minimum(1.0, np.abs(needed) / np.maximum(np.abs(bends), ANGLE_ROUNDING))
+    curvatures = np.where(enough, fits * (slopes * frames).sum(axis=(1, 2)), 0.0)
+    smooth_weights = np.where(normals.any(axis=1), running_mean(weights, window), 0.0)
+    return normals, running_mean(curvatures, window), smooth_weights
+
+
+def _normals_at_rim(
+    samples: RimSamples, loop: Floats, tangents: Floats, patches: Ints, reach: float
+) -> tuple[Floats, Floats, Floats, Bools]:
+    """Fit a linear function of position to the normals of the samples near each of the (n, 3) points of a rim.
+
+    `tangents`, (n, 3), are those of the rim, and `patches`, (n,), end there. Return (n, 3) unit normals at the points,
+    (n, 2, 3) derivatives of the normal along two directions, (n, 2, 3) these directions, across and along the rim, and
+    (n,) whether there are enough samples; without, normals are 0.
+    """
+    n = len(loop)
     rows, near, distances = _within(samples, loop, patches, reach)
     weights = samples.areas[near] * (1.0 - (distances / reach) ** 2)  # falls to 0 at the reach
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
     means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))  # over samples near each point
     positions, corners = samples.positions - loop[0], loop - loop[0]
-    middle, mean_positions = means @ samples.normals, means @ positions
+    mean_normals, mean_positions = means @ samples.normals, means @ positions
 
     def covariance(values: Floats) -> Floats:
         """(n, 3, 3) covariances of positions and (k, 3) values over the samples near each point of the rim."""
         products = means @ (positions[:, :, None] * values[:, None]).reshape(-1, 9)
         return products.reshape(-1, 3, 3) - mean_positions[:, :, None] * (means @ values)[:, None]
 
-    across = np.cross(middle, along)
+    across = np.cross(mean_normals, tangents)
     enough = (np.bincount(rows, minlength=n) >= 3) & (np.linalg.norm(across, axis=1) > 1e-6)
     across = unit(across)
-    frame = np.stack([across, unit(np.cross(middle, across))], axis=1)
-    mean = np.einsum("nij,nj->ni", frame, mean_positions - corners)
-    spread = frame @ covariance(positions) @ frame.transpose(0, 2, 1) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
-    slopes = np.linalg.solve(spread, frame @ covariance(samples.normals))
-    at_rim = unit(middle - np.einsum("ni,nij->nj", mean, slopes)) * enough[:, None]
-    outwards = unit(np.cross(at_rim, along))
-    bends, must = width * (slopes[:, 0] * outwards).sum(axis=1), 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)
-    least, most = np.minimum(np.abs(bends), np.abs(must)), np.maximum(np.abs(bends), np.abs(must))
-    ratio = np.sign(bends * must) * least / np.maximum(most, ANGLE_ROUNDING)
-    ratio *= enough
-    # 0 on threads, which bend both ways
-    consistency = max(float(ratio.sum()), 0.0) / max(float(np.abs(ratio).sum()), 1e-300)
-    weights_at_rim = consistency * np.clip(ratio / BEND_RATIO - 1.0, 0.0, 1.0)
-    # no more curvature than the lid needs to cross the opening
-    fits = np.minimum(1.0, np.abs(must) / np.maximum(np.abs(bends), ANGLE_ROUNDING))
-    curvatures = np.where(enough, fits * (slopes * frame).sum(axis=(1, 2)), 0.0)
-    return at_rim, running_mean(curvatures, m), np.where(at_rim.any(axis=1), running_mean(weights_at_rim, m), 0.0)
+    frames = np.stack([across, unit(np.cross(mean_normals, across))], axis=1)
+    offsets = np.einsum("nij,nj->ni", frames, mean_positions - corners)
+    spread = frames @ covariance(positions) @ frames.transpose(0, 2, 1) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
+    slopes = np.linalg.solve(spread, frames @ covariance(samples.normals))
+    normals = unit(mean_normals - np.einsum("ni,nij->nj", offsets, slopes)) * enough[:, None]
+    return normals, slopes, frames, enough
 
 
 def _within(samples: RimSamples, loop: Floats, patches: Ints, reach: float) -> tuple[Ints, Ints, Floats]:
@@ -401,7 +416,10 @@ class _Surface(Frozen):
 
 
 def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints = NO_EDGES) -> Ints:
-    """(k, 3) triangles that fill gaps without area, and if `bent` small holes, between their vertices."""
+    """(k, 3) triangles that fill gaps without area, and if `bent` small holes, between their vertices.
+
+    Boundary edges of the (m, 3) faces among `outlines`, (k, 2), stay open.
+    """
     surface = _Surface(vertices, faces, outlines)
     if not surface.loops:
         return np.empty((0, 3), dtype=np.int64)
@@ -410,28 +428,23 @@ def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints 
     tails, following = np.concatenate([*surface.loops, starts[:0]]), next_in_groups(starts)
     of_loops = turning(surface.vertices[tails], following), surface.behind(tails, tails[following])[0]
     turns, behind = (np.split(values, starts[1:-1]) for values in of_loops)
-    for loop, turn, near in zip(surface.loops, turns, behind, strict=True):
-        corner_indices = np.flatnonzero(turn)
+    for loop, is_corner, faces_behind in zip(surface.loops, turns, behind, strict=True):
+        corner_indices = np.flatnonzero(is_corner)
         if len(corner_indices) < 3:
             triangles.append(fan(loop))
         elif bent and len(corner_indices) <= LOST_FACE_SIDES:
             chosen.append(loop)
             corners.append(corner_indices)
-            normals.append(surface.normals[near[corner_indices]])
+            normals.append(surface.normals[faces_behind[corner_indices]])
     if not chosen:
         return np.concatenate(triangles)
     rims = [loop[corner_indices] for loop, corner_indices in zip(chosen, corners, strict=True)]
-    touching = np.zeros(len(surface.vertices), dtype=bool)
-    touching[np.concatenate(rims)] = True
+    at_corners = mask_of(len(surface.vertices), np.concatenate(rims))
     edges = surface.edges.vertices
-    edges = edges[touching[edges].all(axis=1)]
-    taken = np.sort(edge_keys(edges[:, 0], edges[:, 1]))
-    for loop, corner_indices, lid in zip(
-        chosen,
-        corners,
-        least_bent(surface.vertices, rims, np.concatenate(normals), taken, LARGEST_BEND),
-        strict=True,
-    ):
+    edges = edges[at_corners[edges].all(axis=1)]
+    existing_keys = np.sort(edge_keys(edges[:, 0], edges[:, 1]))
+    small = least_bent(surface.vertices, rims, np.concatenate(normals), existing_keys, LARGEST_BEND)
+    for loop, corner_indices, lid in zip(chosen, corners, small, strict=True):
         if len(lid):
             triangles.append(_with_sides(loop, corner_indices, lid))
     return np.concatenate(triangles)

@@ -367,23 +367,23 @@ def _with_whole_boundary(solid: Solid, mesh: TriangleMesh) -> Solid:
     if proven is None:
         return solid
     # what lies on a face of the mesh is part of it; the rest is completion, as sure as the nearest part of it was
-    given = np.flatnonzero(face_areas(mesh.vertices[mesh.faces]) > 0)
-    tree = FaceTree.of_triangles(mesh.vertices[mesh.faces[given]])
+    with_area = np.flatnonzero(face_areas(mesh.vertices[mesh.faces]) > 0)
+    tree = FaceTree.of_triangles(mesh.vertices[mesh.faces[with_area]])
     faces, squares = tree.nearest(proven.mean(axis=1))
-    on = np.sqrt(squares) <= TOLERANCES[-1] * tolerances(*indexed(proven), SAME_POINT)
-    origins = np.where(on, given[tree.features.ids[faces]], -1)
-    confidence, added = np.ones(len(proven), dtype=np.float32), solid.origins < 0
-    if added.any() and not on.all():
-        patches = FaceTree.of_triangles(solid.triangles[added])
-        nearest = patches.features.ids[patches.nearest(proven[~on].mean(axis=1))[0]]
-        confidence[~on] = solid.confidence[added][nearest]
-    rest = ~solid.bounding
+    is_given = np.sqrt(squares) <= TOLERANCES[-1] * tolerances(*indexed(proven), SAME_POINT)
+    origins = np.where(is_given, with_area[tree.features.ids[faces]], -1)
+    confidence, was_added = np.ones(len(proven), dtype=np.float32), solid.origins < 0
+    if was_added.any() and not is_given.all():
+        patches = FaceTree.of_triangles(solid.triangles[was_added])
+        nearest = patches.features.ids[patches.nearest(proven[~is_given].mean(axis=1))[0]]
+        confidence[~is_given] = solid.confidence[was_added][nearest]
+    inner = ~solid.bounding
     return replace(
         solid,
-        triangles=np.concatenate([proven, solid.triangles[rest]]),
-        origins=np.concatenate([origins, solid.origins[rest]]),
-        confidence=np.concatenate([confidence, solid.confidence[rest]]),
-        bounding=np.append(np.ones(len(proven), dtype=bool), np.zeros(int(rest.sum()), dtype=bool)),
+        triangles=np.concatenate([proven, solid.triangles[inner]]),
+        origins=np.concatenate([origins, solid.origins[inner]]),
+        confidence=np.concatenate([confidence, solid.confidence[inner]]),
+        bounding=np.append(np.ones(len(proven), dtype=bool), np.zeros(int(inner.sum()), dtype=bool)),
         windings=Windings(proven),
         uncrossed=False,
     )

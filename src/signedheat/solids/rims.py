@@ -108,7 +108,8 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
     """Divide n directed edges into loops that pass each vertex once.
 
     Return the edges loop by loop, and the end of each loop in this list. `tails` are the vertices that edges begin at,
-    and `following` the next edge of each. Walks begin at edges in the order `order`.
+    and `following` the next edge of each. Walks begin at edges in the order `order`. Whenever a walk comes to a vertex
+    that it has passed, the edges since then are a loop, and are taken out of the walk.
     """
     n = len(tails)
     index_in_walk, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)

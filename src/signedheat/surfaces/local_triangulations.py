@@ -396,13 +396,13 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
     neighbours = np.full((n, CELL_ROOM), -1, dtype=np.int64)
     counts = np.zeros(n, dtype=np.int64)
     for i in range(n):
-        corner = np.empty((CELL_ROOM, 2))  # corner c is where side c starts
-        beyond = np.full(CELL_ROOM, -1, dtype=np.int64)
+        corner = np.empty((CELL_ROOM, 2))  # of the cell; corner c is where side c starts
+        beyond = np.full(CELL_ROOM, -1, dtype=np.int64)  # the neighbour beyond each side
         new_corner = np.empty((CELL_ROOM, 2))
         new_beyond = np.empty(CELL_ROOM, dtype=np.int64)
         corner[0, 0], corner[1, 0], corner[2, 0], corner[3, 0] = 1.0, 1.0, -1.0, -1.0
         corner[0, 1], corner[1, 1], corner[2, 1], corner[3, 1] = -1.0, 1.0, 1.0, -1.0
-        m, farthest = 4, 2.0
+        m, farthest = 4, 2.0  # number of corners, and squared distance of the farthest
         for j in range(k):
             px, py = places[i, j]
             square = px * px + py * py
@@ -418,17 +418,18 @@ def voronoi_fans(places: Floats) -> tuple[Ints, Ints]:
             new = 0
             for c in range(m):
                 d = (c + 1) % m
-                here = corner[c, 0] * px + corner[c, 1] * py - half
-                there = corner[d, 0] * px + corner[d, 1] * py - half
-                if here <= slack:
+                # heights of the ends of side c beyond the bisector, times the distance of the neighbour
+                tail_height = corner[c, 0] * px + corner[c, 1] * py - half
+                head_height = corner[d, 0] * px + corner[d, 1] * py - half
+                if tail_height <= slack:
                     new_corner[new, 0], new_corner[new, 1] = corner[c, 0], corner[c, 1]
                     new_beyond[new] = beyond[c]
                     new += 1
-                if (here <= slack) != (there <= slack):
-                    s = min(max(here / (here - there), 0.0), 1.0)
+                if (tail_height <= slack) != (head_height <= slack):
+                    s = min(max(tail_height / (tail_height - head_height), 0.0), 1.0)
                     for axis in range(2):
                         new_corner[new, axis] = corner[c, axis] + s * (corner[d, axis] - corner[c, axis])
-                    new_beyond[new] = j if here <= slack else beyond[c]
+                    new_beyond[new] = j if tail_height <= slack else beyond[c]
                     new += 1
             m, farthest = new, 0.0
             for c in range(m):

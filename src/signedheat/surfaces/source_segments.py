@@ -155,6 +155,7 @@ def is_element_list(source: object) -> TypeGuard[ElementList]:
 def curve_of_elements(triangles: Triangles, points: ElementList) -> Curve | SurfacePoints:
     """Make a curve, or a point source for a single point, of a list in the format of potpourri3d: see `ElementList`."""
     kinds = np.array([min(len(given), FACE) for _, given in points])
+    # ids of points of each kind; points of other kinds have ids that exist, so that all are looked up alike
     vertices, edges, faces = (
         np.array([element if kind == wanted else least for (element, _), kind in zip(points, kinds, strict=True)])
         for wanted, least in ((VERTEX, triangles.faces.min()), (EDGE, 0), (FACE, 0))

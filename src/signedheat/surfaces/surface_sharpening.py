@@ -241,21 +241,22 @@ def missing_parts(
 ) -> tuple[PlacedSegments, list[int]]:
     """Find the parts of the zero set of φ that complete the curves, as segments, and the window counts of searches.
 
-    They lie away from the curves, or beyond their free ends, and not in regions that curves bound. `distance` are the
-    (n,) distances from the curves, inf beyond `reach`, which is three times the size of a face or more.
+    They lie away from the curves, or beyond their free ends, and not in regions that curves bound. `values` are φ,
+    (n,), `parts` the curves, which are `placed` in faces, and `spacing` is h of the surface. `distance` are the (n,)
+    distances from the curves, inf beyond `reach`, which is three times the size of a face or more.
     """
     size = np.sqrt(2 * triangles.face_areas)
     corners = triangles.corner_vertices
-    apart = distance[corners].mean(axis=1) > size
+    may_miss = distance[corners].mean(axis=1) > size  # (m,) faces in which parts may be missing
     counts = []
     if len(sides.free_ends):
         ends = CurveSegments.of_points(placed.nodes[sides.free_ends])
         to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, report, reach)
         counts.append(windows)
         beyond = to_ends <= distance * (1 + 1e-3)
-        apart |= beyond[corners].all(axis=1)
-    apart[placed.faces] = False
-    apart &= (sides.regions[corners] == 0).any(axis=1)
+        may_miss |= beyond[corners].all(axis=1)
+    may_miss[placed.faces] = False
+    may_miss &= (sides.regions[corners] == 0).any(axis=1)
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
     unsided = [part for part in parts if not part.oriented]
     if unsided:
@@ -264,7 +265,7 @@ def missing_parts(
         sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
         values = without_false_zeros(triangles, values, near < width, corners[np.concatenate(sided)].ravel())
         counts.append(windows)
-    return zero_line(triangles, values, apart), counts
+    return zero_line(triangles, values, may_miss), counts
 
 
 def without_false_zeros(triangles: IntrinsicMesh, values: Floats, near: Bools, sided: Ints) -> Floats:
