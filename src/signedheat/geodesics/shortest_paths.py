@@ -251,8 +251,10 @@ def on_base(corners: Complexes, side: int, over: int, point: complex, a: complex
 def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tuple[list[int], list[int], float]:
     """Find the shortest path in an unfolded sleeve between two points.
 
-    The portals and faces that are reversed are those of `unfold`. Returns the portals at which the path bends, for each
-    the end at which it does (0 for the tail, 1 for the head), and the length of the path.
+    The (k, 2) portals, and (k,) whether they are turned `over`, are those of `unfold`. A funnel from the last bend, its
+    apex, to the right and left rim is narrowed by each portal; where the rims cross, the path bends. Returns the
+    portals at which the path bends, for each the end at which it does (0 for the tail, 1 for the head), and the length
+    of the path.
     """
     bends, ends = [0], [0]
     bends.pop()

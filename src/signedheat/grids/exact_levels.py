@@ -34,9 +34,10 @@ def on_level(
 ) -> Floats:
     """Move (n, d) points, given in cells, along edges of a grid to an exact level; return their (n, d) positions.
 
-    `distance` is the exact function of positions, and `values` are its values at nodes. Points are not moved if they
-    are not on an edge, or if its ends are not on both sides of the level. It is found by regula falsi (Dowell & Jarratt
-    1971).
+    `distance` is the exact function of positions, and `values` are its values at nodes, the first of which is at
+    `origin`, (d,), with (d,) `spacing`. Points are not moved if they are not on an edge, or if its ends are not on both
+    sides of the level. It is found by regula falsi (Dowell & Jarratt 1971), which halves the value at an end of the
+    interval that stays for a second time.
     """
     if len(points) > POINTS_AT_ONCE:
         parts = np.split(points, range(POINTS_AT_ONCE, len(points), POINTS_AT_ONCE))
@@ -52,7 +53,8 @@ def on_level(
     crossed = (low < 0) != (high < 0)
     movable, low, high = movable[crossed], low[crossed], high[crossed]
     moved = origin + points * spacing
-    base, axis, far = base[movable], axis[movable], ON_LEVEL * float(spacing.min())
+    base, axis, tolerance = base[movable], axis[movable], ON_LEVEL * float(spacing.min())
+    # the interval on each edge, and which of its ends moved last: 1 for the start, −1 for the stop
     start, stop, last = np.zeros(len(base)), np.ones(len(base)), np.zeros(len(base), dtype=np.int8)
     active = np.arange(len(base))
     for _ in range(10):  # few points need more than 4
@@ -63,14 +65,14 @@ def on_level(
         cells = base[active].astype(np.float64)
         cells[np.arange(len(active)), axis[active]] += share
         positions = origin + cells * spacing
-        off = distance(positions) - level
+        heights = distance(positions) - level
         moved[movable[active]] = positions
-        same = (off < 0) == (low[active] < 0)
-        ahead, behind = active[same], active[~same]
-        start[ahead], low[ahead] = share[same], off[same]
-        stop[behind], high[behind] = share[~same], off[~same]
-        high[ahead] *= np.where(last[ahead] > 0, 0.5, 1.0)
-        low[behind] *= np.where(last[behind] < 0, 0.5, 1.0)
-        last[ahead], last[behind] = 1, -1
-        active = active[np.abs(off) > far]
+        like_start = (heights < 0) == (low[active] < 0)
+        starts, stops = active[like_start], active[~like_start]  # intervals of which this end moves
+        start[starts], low[starts] = share[like_start], heights[like_start]
+        stop[stops], high[stops] = share[~like_start], heights[~like_start]
+        high[starts] *= np.where(last[starts] > 0, 0.5, 1.0)
+        low[stops] *= np.where(last[stops] < 0, 0.5, 1.0)
+        last[starts], last[stops] = 1, -1
+        active = active[np.abs(heights) > tolerance]
     return moved

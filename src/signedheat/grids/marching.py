@@ -153,23 +153,23 @@ def window_surfaces(values: BlockValues, spacing: Floats, level: float) -> Itera
 def _window_surface(height: NDArray[np.float32]) -> tuple[Floats, Ints] | None:
     """Return (n, 3) vertices, in cells, and (m, 3) faces of the zero set in cells whose nodes all have values.
 
-    Return None if no such cell is crossed.
+    `height`, (a, b, c), are the values at the nodes of a window of a grid, NaN where there is none. Return None if no
+    such cell is crossed.
     """
-    finite = ~np.isnan(height)
-    whole = np.zeros(height.shape, dtype=bool)  # each cell is marked at its last node
-    inner = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)
-    any_inside, all_inside = np.zeros_like(inner), np.ones_like(inner)
-    inside = height < 0
+    finite, inside = ~np.isnan(height), height < 0
+    crossed = np.ones(tuple(n - 1 for n in height.shape), dtype=bool)  # cells with values at all nodes, of both signs
+    any_inside, all_inside = np.zeros_like(crossed), np.ones_like(crossed)
     for corner in np.ndindex(2, 2, 2):
-        part = tuple(slice(c, n - 1 + c) for c, n in zip(corner, height.shape, strict=True))
-        inner &= finite[part]
-        any_inside |= inside[part]
-        all_inside &= inside[part]
-    inner &= any_inside & ~all_inside
-    if not inner.any():
+        corners = tuple(slice(c, n - 1 + c) for c, n in zip(corner, height.shape, strict=True))
+        crossed &= finite[corners]
+        any_inside |= inside[corners]
+        all_inside &= inside[corners]
+    crossed &= any_inside & ~all_inside
+    if not crossed.any():
         return None
-    whole[1:, 1:, 1:] = inner
-    return zero_set(np.where(finite, height, np.float32(1.0)), whole)
+    marked = np.zeros(height.shape, dtype=bool)  # each cell is marked at its last node
+    marked[1:, 1:, 1:] = crossed
+    return zero_set(np.where(finite, height, np.float32(1.0)), marked)
 
 
 def edges_of(vertices: Floats) -> tuple[Bools, Ints]:
@@ -220,6 +220,7 @@ def contour_parts(values: BlockValues, spacing: Floats, level: float) -> Iterato
     seams: dict[tuple[int, ...], _Seam] = {}
     count = 0
     for window, points, triangles in window_surfaces(values, spacing, level):
+        # points on walls of windows are found again in the next ones, by the grid edges that they lie on
         on_edge, keys = edges_of(points)
         on_wall = (points % (WINDOW * BLOCK) == 0).any(axis=1)
         shared = np.flatnonzero(on_edge & on_wall)

@@ -225,7 +225,9 @@ def _carry(
 ) -> None:
     """Copy vectors at nodes that the coarse grid shares to `coarse`, with lengths raised to a power.
 
-    Add the number of known nodes in each stretch of the coarse grid to `counts`.
+    `vectors` are (a, b, c, d, 4), known in the stretches of lines along the last axis where `inside` is true, and
+    `coarse` has a node for every `factors`, (4,), nodes of these. The number of nodes known in each stretch of the
+    coarse grid is added to `counts`.
     """
     n0, n1, n2, n3 = vectors.shape[:4]
     for i in range(0, n0, 2 if factors[0] == 2 else 1):
@@ -252,7 +254,9 @@ def _interpolate(
 ) -> None:
     """Interpolate values of a coarser grid, (q, a, b, c, d), to the nodes of a slab of `out`, the finer grid.
 
-    It is linear along axes that were halved, and constant along those that were reduced to one node.
+    The slab has the nodes `start` to `stop` along an axis, 0 or 1. `factors`, (4,), are the spacings of the coarser
+    grid, relative to the finer. It is linear along axes that were halved, and constant along those that were reduced to
+    one node.
     """
     _, n0, n1, n2, n = out.shape
     row = np.empty(coarse.shape[4], dtype=np.float32)

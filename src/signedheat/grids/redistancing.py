@@ -379,25 +379,31 @@ def _nearest_corners(points: Floats, corners: Ints, nodes: Floats) -> Ints:
 def _circle_distances(
     points: Floats, normals: Floats, bends: Floats, reach: float, crossings: Ints, nodes: Floats
 ) -> Floats:
-    """Compute `circle_distances`, given the arrays of `Crossings`."""
+    """(r,) distances of (r, 4) `nodes` to the circles that touch the zero set at the (r,) `crossings`.
+
+    Crossings lie at (c, 4) `points` and have (c, 4) unit `normals` and (c, 4, 4) `bends`, the second fundamental forms.
+    No circle is nearer than its crossing by more than `reach`.
+    """
     distances, away, across = np.empty(len(nodes)), np.empty(4), np.empty(4)
     for row in range(len(nodes)):
         c = crossings[row]
-        height, square, aside, bend = 0.0, 0.0, 0.0, 0.0
+        # of the node: height above the tangent plane, squared distances from the crossing and along the plane; and the
+        # curvature in its direction
+        height, square, square_aside, bend = 0.0, 0.0, 0.0, 0.0
         for d in range(4):
             away[d] = nodes[row, d] - points[c, d]
             height += away[d] * normals[c, d]
             square += away[d] * away[d]
         for d in range(4):
             across[d] = away[d] - height * normals[c, d]
-            aside += across[d] * across[d]
+            square_aside += across[d] * across[d]
         for d in range(4):
             for e in range(4):
                 bend += across[d] * bends[c, d, e] * across[e]
-        bend = bend / aside if aside > 1e-12 * square else 0.0
+        bend = bend / square_aside if square_aside > 1e-12 * square else 0.0
         distances[row] = np.sqrt(square)
         # beyond the centre the other side of the circle is nearer, which is no surface
-        if aside > 1e-12 * square and 1.0 + bend * height > 0.0:
+        if square_aside > 1e-12 * square and 1.0 + bend * height > 0.0:
             root = np.sqrt(max(1.0 + 2.0 * bend * height + bend * bend * square, 0.0))
             circle = abs(2.0 * height + bend * square) / (1.0 + root)
             distances[row] = min(distances[row], max(circle, distances[row] - reach))
@@ -470,9 +476,10 @@ def crossed_edges(field: Floats) -> NDArray[np.int32]:
 
 @compiled
 def _cubic(field: Floats, position: Floats, weights: Floats, gradient: Floats) -> float:
-    """Return the cubic convolution interpolant (Keys 1981) at a place, (4,) in cells; write its gradient.
+    """Return the cubic convolution interpolant (Keys 1981) of a field with four axes; write its gradient, (4,).
 
-    `weights`, (2, 4, 4), is working memory.
+    `position` is (4,) in cells. `weights` is working memory, (2, 4, 4): those of values and of derivatives, along each
+    axis, of four nodes.
     """
     base = np.empty(4, dtype=np.int64)
     for axis in range(4):

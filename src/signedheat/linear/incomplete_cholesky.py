@@ -102,12 +102,12 @@ def from_first(upper: sparse.csr_matrix) -> IncompleteCholesky:
 def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats) -> bool:
     """Compute the IC(0) factor in place, and return whether all pivots are positive.
 
-    `factor` has the strictly lower triangle by rows, and `pivots` the diagonal, which becomes the inverse diagonal of
-    the factor.
+    `factor` has the strictly lower triangle by rows, the CSR matrix with `indptr` and sorted `indices`, and `pivots`,
+    (n,), the diagonal, which becomes the inverse diagonal of the factor.
     """
     for i in range(len(pivots)):
-        own = pivots[i]
-        rest = own
+        diagonal = pivots[i]
+        rest = diagonal
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
             value = factor[k]
@@ -124,7 +124,7 @@ def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Fl
             value *= pivots[j]
             factor[k] = value
             rest -= value * value
-        if not rest > 1e-12 * own:
+        if not rest > 1e-12 * diagonal:
             return False
         pivots[i] = 1.0 / np.sqrt(rest)
     return True
@@ -134,7 +134,10 @@ def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Fl
 def _precondition(
     indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Floats, pivots: Floats, r: Floats
 ) -> Floats:
-    """Return z = (L Lᵀ)⁻¹ r, by forward and backward substitution, for r of shape (n, c)."""
+    """Return z = (L Lᵀ)⁻¹ r, by forward and backward substitution, for r of shape (n, c).
+
+    L is given by the arrays of `_factorize`.
+    """
     n, width = r.shape
     z = np.empty((n, width))
     for i in range(n):

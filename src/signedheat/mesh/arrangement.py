@@ -90,7 +90,7 @@ def meeting_faces(points: Floats, faces: Ints, slacks: Floats | None = None) -> 
 
 
 def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Floats | None = None) -> Arrangement:
-    """Divide (m, 3) faces where they meet, and unbalanced edges where others of them end.
+    """Divide (m, 3) faces on (n, 3) points where they meet, and unbalanced edges where others of them end.
 
     `pairs`, (k, 2), are the faces that may meet, by default all. Points are merged if they are closer than the
     `slacks`, (m,), of the faces on which they lie. Triangles thinner than their slack are dropped.
@@ -112,14 +112,13 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
     meetings, positions, meeting_slacks = _meetings(
         read_only(np.ascontiguousarray(points)), faces, table.vertices, table.face_edges, pairs, slacks
     )
-    kinds, first, second = meetings.T
+    kinds, first, second = meetings.T  # the second element is the vertex where no point is new: see `_meetings`
     new = kinds >= TWO_EDGES
     points, reaches, ids = _with_new(points, reaches, meetings, positions, meeting_slacks, new, second)
-    on_edge, edges, pierced, in_face = kinds == ON_EDGE, kinds == TWO_EDGES, kinds == EDGE_AND_FACE, kinds == IN_FACE
-    along = on_edge | edges | pierced
+    in_face, two_edges, pierced = kinds == IN_FACE, kinds == TWO_EDGES, kinds == EDGE_AND_FACE
     lines = Lines(
         table.vertices,
-        Incidence.of(on_open, (first[along], ids[along]), (second[edges], ids[edges])),
+        Incidence.of(on_open, (first[~in_face], ids[~in_face]), (second[two_edges], ids[two_edges])),
         Incidence.of((first[in_face], ids[in_face]), (second[pierced], ids[pierced])),
     )
     lines = lines.renamed(_welded(points, np.concatenate([busy, np.unique(ids)]), reaches))
@@ -181,7 +180,8 @@ def _with_new(
 def _on_open_edges(points: Floats, table: EdgeTable, reaches: Floats) -> tuple[Ints, Ints]:
     """Return (k,) unbalanced edges, and (k,) vertices on them that are ends of other unbalanced edges.
 
-    An edge is unbalanced if not as many faces run along it in one direction as in the other.
+    An edge is unbalanced if not as many faces run along it in one direction as in the other. `reaches`, (n,), are the
+    distances up to which the (n,) points lie on edges.
     """
     edges = np.flatnonzero(table.balance != 0)
     if not len(edges):
@@ -192,12 +192,12 @@ def _on_open_edges(points: Floats, table: EdgeTable, reaches: Floats) -> tuple[I
     rim = np.unique(ends)
     starts, near = tree.meeting(np.repeat(points[rim][:, None], 3, axis=1), reaches[rim])
     vertex = np.repeat(rim, np.diff(starts))
-    away, way = points[vertex] - tails[near], (heads - tails)[near]
-    share = (away * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-300)
+    from_tail, edge_vectors = points[vertex] - tails[near], (heads - tails)[near]
+    share = (from_tail * edge_vectors).sum(axis=1) / np.maximum((edge_vectors * edge_vectors).sum(axis=1), 1e-300)
     slacks = np.minimum(reaches[vertex], reaches[ends[near]].min(axis=1))
-    on = (np.linalg.norm(away - share[:, None] * way, axis=1) <= slacks) & (share > 0) & (share < 1)
-    on &= (vertex[:, None] != ends[near]).all(axis=1)
-    return edges[near[on]], vertex[on]
+    heights = np.linalg.norm(from_tail - share[:, None] * edge_vectors, axis=1)
+    is_on = (heights <= slacks) & (share > 0) & (share < 1) & (vertex[:, None] != ends[near]).all(axis=1)
+    return edges[near[is_on]], vertex[is_on]
 
 
 def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incidence:
@@ -218,42 +218,54 @@ class Records(NamedTuple):
 def _with_segments(
     points: Floats, faces: Ints, table: EdgeTable, pairs: Ints, lines: Lines, slacks: Floats
 ) -> tuple[Lines, Records]:
-    """Add the segments along which pairs of faces meet, found from the points that both faces have in common."""
+    """Add the segments along which `pairs`, (k, 2), of faces meet, found from the points that both have in common.
+
+    `slacks`, (m,), are those of the faces. Also return where lines lie in faces.
+    """
     members = _members(faces, table, lines, np.unique(pairs))
     chains = Chains(lines.ends, lines.on.starts(len(lines.ends)), lines.on.points)
     starts = members.starts(len(faces))
     rows, sides = _segments(
         read_only(points), starts, members.points, table.face_edges, chains, pairs, ON_LINE * slacks
     )
-    own = rows[:, 1] >= len(lines.ends)
+    on_segment = rows[:, 1] >= len(lines.ends)
     ends = np.zeros((len(sides), 2), dtype=np.int64)
-    ends[rows[own, 1] - len(lines.ends)] = rows[own, 2:]
+    ends[rows[on_segment, 1] - len(lines.ends)] = rows[on_segment, 2:]
     return lines._replace(ends=np.concatenate([lines.ends, ends]), sides=sides), Records(*rows.T)
 
 
 def _with_crossings(
     points: Floats, lines: Lines, records: Records, reaches: Floats, slacks: Floats, busy: Ints
 ) -> tuple[Floats, Lines, Records]:
-    """Add the points in which lines cross or touch within faces."""
+    """Add the points in which lines cross or touch within faces.
+
+    `reaches`, (n,), and `slacks`, (m,), are the distances within which points, and what lies on faces, are merged; the
+    points with ids `busy` may have others near them. Return all points, lines and records.
+    """
     if not len(records.faces):
         return points, lines, records
     ends = np.stack([records.tails, records.heads], axis=1)
     corners = points[ends[:, [0, 1, 1]]]
     tree = BoxTree.around(corners)
-    within = slacks[records.faces]
-    starts, near = tree.meeting(corners, within)
-    touching, crossing, positions = _cross(read_only(points), records.faces, records.lines, ends, starts, near, within)
-    within = within[crossing[:, 0]]
+    record_slacks = slacks[records.faces]
+    starts, near = tree.meeting(corners, record_slacks)
+    touching, crossing, positions = _cross(
+        read_only(points), records.faces, records.lines, ends, starts, near, record_slacks
+    )
+    new_slacks = record_slacks[crossing[:, 0]]
     first, second = records.lines[crossing].T
+    # a crossing is named by its lines, so that it is one point in all faces in which it is found. Two segments cross
+    # where three faces do: one face is a side of both, and the three name the point
     n_edges = len(lines.ends) - len(lines.sides)
     names = np.stack([np.minimum(first, second), np.maximum(first, second), np.full(len(first), -1)], axis=1)
-    three = names[:, 0] >= n_edges  # two segments cross where three faces do, which name the point
-    of_faces = np.sort(lines.sides[names[three][:, :2] - n_edges].reshape(-1, 4), axis=1)
-    twice = np.append(of_faces[:, 1:] == of_faces[:, :-1], np.zeros((len(of_faces), 1), dtype=bool), axis=1)
-    single = twice.sum(axis=1) == 1
-    names[np.flatnonzero(three)[single]] = of_faces[single][~twice[single]].reshape(-1, 3) + len(lines.ends)
-    every = np.ones(len(names), dtype=bool)
-    points, reaches, ids = _with_new(points, reaches, names, positions, within, every, first)
+    of_segments = names[:, 0] >= n_edges
+    sides = np.sort(lines.sides[names[of_segments][:, :2] - n_edges].reshape(-1, 4), axis=1)
+    is_repeated = np.append(sides[:, 1:] == sides[:, :-1], np.zeros((len(sides), 1), dtype=bool), axis=1)
+    of_three = is_repeated.sum(axis=1) == 1
+    three_faces = sides[of_three][~is_repeated[of_three]].reshape(-1, 3)
+    names[np.flatnonzero(of_segments)[of_three]] = three_faces + len(lines.ends)
+    all_new = np.ones(len(names), dtype=bool)
+    points, reaches, ids = _with_new(points, reaches, names, positions, new_slacks, all_new, first)
     lines = lines._replace(on=Incidence.of(lines.on, tuple(touching.T), (first, ids), (second, ids)))
     rename = _welded(points, np.concatenate([busy, lines.on.points, lines.within.points, lines.ends.ravel()]), reaches)
     records = records._replace(tails=rename[records.tails], heads=rename[records.heads])
@@ -459,7 +471,7 @@ def _normal(points: Floats, face: Ints) -> tuple[float, float, float]:
 
 @compiled
 def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
-    """Return whether the projection of a position x on a face, along its normal n, is inside the face."""
+    """Return whether the projection of x, (3,), on a face, (3,) point ids, along its normal n, (3,), is inside it."""
     for k in range(3):
         a, b = face[k], face[(k + 1) % 3]
         turn = 0.0

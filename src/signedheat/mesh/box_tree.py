@@ -78,9 +78,14 @@ class BoxTree(NamedTuple):
 
 @compiled
 def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, starts: Ints, out: Ints) -> None:
-    """Write the ids of the boxes near each triangle into `out`, as far as there is room, and offsets into `starts`."""
+    """Write the ids of the boxes near each triangle into `out`, as far as there is room, and offsets into `starts`.
+
+    A row of `corners` has the nine coordinates of a triangle; boxes are near if they are within its slack, of (t,)
+    `slacks`, along the axes, along its normal, and in its plane perpendicular to its sides.
+    """
     bounds, items = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
+    # the box of the triangle; its normal and three directions in its plane, and its extent along these
     lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
     for t in range(len(corners)):
         for d in range(3):

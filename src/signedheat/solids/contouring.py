@@ -208,13 +208,14 @@ def _vertices(
     step = float(grid.spacing.max())
     corners = grid.origin + cells * grid.spacing
     room = CLEARANCE * grid.spacing
+    # each vertex minimises the squared distances from the planes at the crossed edges; positions are from the middles
     lower, upper = corners + room, corners + grid.spacing - room
     middles = np.clip(
         sums_of(points[crossed], owners, count) / np.bincount(owners, minlength=count)[:, None], lower, upper
     )
     lower, upper = lower - middles, upper - middles
-    on, normals = (part[crossed] for part in offset.planes(points))
-    quadrics = Quadrics.of(owners, on - middles[owners], normals, count)
+    feet, normals = (values[crossed] for values in offset.planes(points))
+    quadrics = Quadrics.of(owners, feet - middles[owners], normals, count)
     minima, ranks = minimizers(quadrics, lower, upper)
     off, gradients = offset.slopes(middles + minima)
     wider = np.full((count, 3), np.nan)
@@ -222,18 +223,20 @@ def _vertices(
     if len(creased):
         # find planes in a cell with a crease that do not cross its edges
         low, high = lower[creased] - OUTSIDE_CELL * grid.spacing, upper[creased] + OUTSIDE_CELL * grid.spacing
-        on, normals = offset.planes(((middles + minima)[creased, None] + PROBE_OFFSETS * grid.spacing).reshape(-1, 3))
+        probes = ((middles + minima)[creased, None] + PROBE_OFFSETS * grid.spacing).reshape(-1, 3)
+        feet, normals = offset.planes(probes)
         probed = np.repeat(np.arange(len(creased)), len(PROBE_OFFSETS))
-        on -= middles[creased][probed]
-        within = ((on > low[probed]) & (on < high[probed])).all(axis=1)
-        more = Quadrics.of(probed[within], on[within], normals[within], len(creased))
-        farther, higher = minimizers(quadrics[creased] + more, low, high)
-        error = np.abs(offset.distance(middles[creased] + farther))
-        wanted = (error < ON_LEVEL * step) & (
-            (higher > ranks[creased]) | (higher == 3) | (np.abs(off[creased]) > ON_LEVEL * step)
+        feet -= middles[creased][probed]
+        within = ((feet > low[probed]) & (feet < high[probed])).all(axis=1)
+        more = Quadrics.of(probed[within], feet[within], normals[within], len(creased))
+        wider_minima, wider_ranks = minimizers(quadrics[creased] + more, low, high)
+        error = np.abs(offset.distance(middles[creased] + wider_minima))
+        # if they lie on the surface, and on more of its planes, on a corner, or where the first minimum does not
+        better = (error < ON_LEVEL * step) & (
+            (wider_ranks > ranks[creased]) | (wider_ranks == 3) | (np.abs(off[creased]) > ON_LEVEL * step)
         )
-        wider[creased[wanted]] = middles[creased[wanted]] + farther[wanted]
-    for _ in range(2):
+        wider[creased[better]] = middles[creased[better]] + wider_minima[better]
+    for _ in range(2):  # steps of Newton's method towards the surface
         far = np.flatnonzero(np.abs(off) > ON_LEVEL * step)
         minima[far] = np.clip(minima[far] - off[far, None] * gradients[far], lower[far], upper[far])
         off[far], gradients[far] = offset.slopes(middles[far] + minima[far])
@@ -245,9 +248,10 @@ def divided_along_creases(
 ) -> tuple[Floats, Ints]:
     """Divide edges that cut off a crease of `offset` at points on the crease, unless triangles would intersect.
 
-    Return the (n, 3) vertices and (m, 3) faces of the divided mesh, with the given vertices first.
+    Return the (n, 3) vertices and (m, 3) faces of the divided mesh, with the given vertices first. `spacing`, (3,), is
+    that of the grid on which the mesh was contoured.
     """
-    new = np.ones(len(faces), dtype=bool)
+    new = np.ones(len(faces), dtype=bool)  # faces whose edges are still to be looked at
     for _ in range(DIVISIONS if len(faces) <= MOST_CREASED_FACES else 0):
         edges, points = _creases_off(offset, spacing, vertices, faces, new)
         if not len(edges):
@@ -291,23 +295,25 @@ def _creases_off(
     edges = edges[new[edges // 3].any(axis=1)]
     tails, heads = faces.ravel()[edges[:, 0]], faces.ravel()[edges[:, 1]]
     middles = 0.5 * (vertices[tails] + vertices[heads])
-    off = np.abs(offset.distance(middles))
-    rows = np.flatnonzero(off > CHORD_ERROR * step)
-    rows = rows[np.argsort(-off[rows], kind="stable")]
+    heights = np.abs(offset.distance(middles))
+    rows = np.flatnonzero(heights > CHORD_ERROR * step)
+    rows = rows[np.argsort(-heights[rows], kind="stable")]
     edges, middles = edges[rows], middles[rows]
-    across = vertices[faces[edges // 3, (edges + 2) % 3]]
-    probes = [middles + share * (across[:, side] - middles) for share in PROBE_SHARES for side in range(2)]
-    on, directions = offset.planes(np.concatenate(probes))
+    # the point nearest to the planes of the surface around the edge is on the crease; failing that, one on the surface
+    apexes = vertices[faces[edges // 3, (edges + 2) % 3]]
+    probes = [middles + share * (apexes[:, side] - middles) for share in PROBE_SHARES for side in range(2)]
+    feet, normals = offset.planes(np.concatenate(probes))
     owners = np.tile(np.arange(len(edges)), len(probes))
     room = np.broadcast_to(OUTSIDE_CELL * spacing, middles.shape)
-    moves, _ = minimizers(Quadrics.of(owners, on - middles[owners], directions, len(edges)), -room, room)
-    off, gradients = offset.slopes(middles)
-    points, nearest = middles + moves, middles - off[:, None] * gradients
+    moves, _ = minimizers(Quadrics.of(owners, feet - middles[owners], normals, len(edges)), -room, room)
+    distances, gradients = offset.slopes(middles)
+    points, nearest = middles + moves, middles - distances[:, None] * gradients
     points = np.where((np.abs(offset.distance(points)) < ON_LEVEL * step)[:, None], points, nearest)
+    # of edges that share a face, only the one farthest from the surface is returned
     first = np.full(len(faces), len(edges))
     np.minimum.at(first, edges // 3, np.arange(len(edges))[:, None])
-    alone = (first[edges // 3] == np.arange(len(edges))[:, None]).all(axis=1)
-    return edges[alone], points[alone]
+    is_first = (first[edges // 3] == np.arange(len(edges))[:, None]).all(axis=1)
+    return edges[is_first], points[is_first]
 
 
 def _divided(vertices: Floats, faces: Ints, edges: Ints, points: Floats) -> tuple[Floats, Ints]:

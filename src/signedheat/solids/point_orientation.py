@@ -23,13 +23,13 @@ compared. These are so many that most of them lie on the surface, even if strays
 def without_strays(cloud: PointCloud) -> tuple[PointCloud, list[StrayPoints]]:
     """Leave out points that lie far from all others, compared with the points around them; say how many in a note."""
     ids, owners = np.unique(cloud.representatives, return_inverse=True)
-    few, many = STRAY_NEIGHBORS
-    many = min(many, len(ids) // 4)
-    if many <= few:
+    n_nearest, n_around = STRAY_NEIGHBORS
+    n_around = min(n_around, len(ids) // 4)
+    if n_around <= n_nearest:
         return cloud, []
     points = cloud.points[ids]
-    away, near = PointTree(points).query(points, many + 1)
-    gaps = away[:, 1 : few + 1].mean(axis=1)
+    distances, near = PointTree(points).query(points, n_around + 1)
+    gaps = distances[:, 1 : n_nearest + 1].mean(axis=1)
     strays = (gaps > STRAY_DISTANCE * np.median(gaps[near[:, 1:]], axis=1))[owners.ravel()]
     if not strays.any():
         return cloud, []
@@ -122,9 +122,11 @@ def _fit(
 ) -> tuple[Floats, Floats]:
     """(k,) heights of (k, 3) places above the surface through the (k, n, 3) points around each, and (k,) weights.
 
-    `ahead` are (k, 3) directions of ∇φ at the places, `reach` the (k, n) distances to the points, and `gap` their mean
-    spacing. Weights are 1 close to enough points, and fall to 0.
+    `ahead` are (k, 3) directions of ∇φ at the places, `reach` the (k, n) distances to the points, `normals` the (k, n,
+    3) unit normals of these, and `gap` their mean spacing. Weights are 1 close to enough points, and fall to 0.
     """
+    # the weighted mean of heights above planes through the points whose normals agree with ∇φ. The normal of a plane is
+    # half-way between that of its point and their mean: on a sphere all heights are then 0
     cosines = np.einsum("pki,pi->pk", normals, ahead)
     facing = cosines > FACING_COSINE
     ranked = np.sort(np.where(facing, reach, np.inf), axis=1)

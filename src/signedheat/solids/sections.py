@@ -108,7 +108,7 @@ def section_levels(heights: ArrayLike | None) -> Floats:
 
 
 def sections(surface: TriangleMesh | None, others: Floats, plane: Plane, levels: Floats) -> list[Section]:
-    """Cut a closed surface, and (m, 3, 3) triangles of sheets, by planes at (k,) levels above a plane: k sections."""
+    """Cut a closed surface, and `others`, (m, 3, 3) triangles of sheets, by planes at (k,) levels above a plane."""
     outlines: list[list[Floats]] = [[] for _ in levels]
     if surface is not None:
         crossed = Crossed.of(surface.vertices, surface.faces, plane, levels)

@@ -127,7 +127,10 @@ def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:
 
 
 def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrangement:
-    """Divide faces where they meet: closing faces where they meet each other, all others where they meet these."""
+    """Divide (m, 3) faces where they meet: closing faces where they meet each other, all others where they meet these.
+
+    `closing`, (m,), tells which faces count in the winding number; `slacks`, (m,), are their tolerances.
+    """
     pairs = overlapping_faces(points, faces, slacks, closing)
     both = closing[pairs].all(axis=1)
     closing_ids = np.flatnonzero(closing)
@@ -135,13 +138,13 @@ def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrange
     pieces = _arranged(points, faces, closing_ids, number[pairs[both]], slacks)
     if closing.all():
         return pieces
-    across = pairs[~both]
-    relevant = ~closing
-    relevant[across] = True
-    used = np.flatnonzero(relevant)
+    mixed = pairs[~both]
+    is_involved = ~closing
+    is_involved[mixed] = True
+    involved = np.flatnonzero(is_involved)
     number = np.full(len(faces), -1)
-    number[used] = np.arange(len(used))
-    others = _arranged(points, faces, used, number[across], slacks)
+    number[involved] = np.arange(len(involved))
+    others = _arranged(points, faces, involved, number[mixed], slacks)
     sheets = ~closing[others.origins]
     return Arrangement(
         np.concatenate([pieces.points, others.points]),

@@ -259,8 +259,11 @@ def exchange(
 ) -> int:
     """Transfer a point, the first row, and vectors over one step, in place; return which new face contains the point.
 
-    `c` are the weights of the step's affine dependency. `corners` are the indices among its four points of the corners
-    of the old face, and `new_corners` those of all new faces; `start` and `new_start` are their first sides.
+    `rows`, (k, 3), are barycentric coordinates, and differences of such. `c`, (4,), are the weights of the step's
+    affine dependency ``Σ ± c_l x_l = 0`` of four points, of which the old face has three. `corners`, (3,), are the
+    indices of its corners among them, and `new_corners` those of all new faces; `start` and `new_start` are their first
+    sides. Adding a multiple of the dependency leaves a point where it is. So the multiple is taken for which the
+    coordinate of one point vanishes and none becomes negative: the new face is the one without this point.
     """
     lead = 3 if kind == SPLIT_FACE else 2  # points with a smaller index are on one side of the dependency
     x = np.zeros(4)

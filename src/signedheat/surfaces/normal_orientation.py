@@ -164,7 +164,9 @@ def _nearest_signs(points: Floats, normals: Floats, queries: Floats, axes: Float
 def sign_links(points: Floats, axes: Floats, reaches: Floats, noisy: bool = False) -> tuple[Links, bool]:
     """Link the signs of (n, 3) axes by neighbours, by balls, and by the hull to the outside, which is node n.
 
-    Also return whether there are balls; without them, as for points in a plane, neighbours alone are linked.
+    Balls are circumscribed about the tets of the Delaunay triangulation, whose points are moved by a small share of
+    their (n,) `reaches`, so that none are on one sphere. Also return whether there are balls; without them, as for
+    points in a plane, neighbours alone are linked. Neighbours count less unless points are `noisy`.
     """
     near = _neighbor_links(points, axes, 1.0 if noisy else WEAK_WEIGHT)
     moves = np.random.default_rng(0).uniform(-1, 1, points.shape) * (JOGGLE * reaches[:, None])
@@ -187,8 +189,13 @@ def _confidence(cosines: Floats) -> Floats:
 
 
 def _ball_links(points: Floats, axes: Floats, tets: Ints) -> Links:
-    """Link the signs at every two corners of a tet along whose axes its circumscribed ball lies; tets are (t, 4)."""
+    """Link the signs at every two corners of a tet along whose axes its circumscribed ball lies; tets are (t, 4).
+
+    There are no points in such a ball, so that it is taken to lie on one side: all axes point into it, or none does.
+    `points` and `axes` are (n, 3).
+    """
     corners = points[tets]
+    # the centre, relative to the first corner, of the ball through all corners
     u, v, w = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
     uu, vv, ww = ((side * side).sum(axis=1, keepdims=True) for side in (u, v, w))
     vw = np.cross(v, w)

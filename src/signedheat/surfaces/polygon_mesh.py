@@ -208,7 +208,8 @@ class VirtualRefinement:
 def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> VirtualRefinement:
     """Subdivide polygons into fans, or by diagonals where fan triangles would be flipped over.
 
-    `corners`, (c,), are their vertex ids, polygon by polygon; polygon k begins at ``offsets[k]``.
+    `corners`, (c,), are their vertex ids, polygon by polygon; polygon k begins at ``offsets[k]``. Corners that repeat
+    the one before are left out, and polygons of three stay as they are.
     """
     before = np.roll(corners, 1)
     before[offsets[:-1]] = corners[offsets[1:] - 1]
@@ -223,10 +224,10 @@ def virtual_refinement(vertices: Floats, corners: Ints, offsets: Ints) -> Virtua
     tails, heads = corners[in_fan], corners[following[in_fan]]
     centers, weights = virtual_vertices(vertices, tails, heads, fan_of, len(fans))
 
-    whole = area_vectors(np.stack([vertices[tails], vertices[heads], centers[fan_of]], axis=1))
-    total = sums_of(whole, fan_of, len(fans))
-    part = (whole * total[fan_of]).sum(axis=1)
-    flipped_fans = mask_of(len(fans), fan_of[part < _SLIVER * (total * total).sum(axis=1)[fan_of]])
+    areas = area_vectors(np.stack([vertices[tails], vertices[heads], centers[fan_of]], axis=1))
+    total = sums_of(areas, fan_of, len(fans))
+    projected = (areas * total[fan_of]).sum(axis=1)  # on the area vector of the polygon
+    flipped_fans = mask_of(len(fans), fan_of[projected < _SLIVER * (total * total).sum(axis=1)[fan_of]])
     # what passes a corner twice goes round a hole, which a fan would fill
     order = np.lexsort((tails, fan_of))
     again = (np.diff(tails[order]) == 0) & (np.diff(fan_of[order]) == 0)

@@ -155,8 +155,9 @@ def _octree(
 ) -> tuple[Ints, Ints]:
     """(n, 3) lower corners and (n,) sizes of the leaves of an octree, in half cells of the finest level.
 
-    Cells are split up to `depth` times if they are nearer to the samples than `grading` times their size. The coarsest
-    level has (3,) `counts` of cells, the finest cells of size `spacing`. Leaves need no balancing.
+    Cells are split up to `depth` times if they are nearer to the samples (a tree of points) than `grading` times their
+    size. The coarsest level has (3,) `counts` of cells from `origin`, (3,), on, the finest has cells of size `spacing`.
+    Leaves need no balancing. `resolution` is for the error if there are too many.
     """
     size = 2 ** (depth + 1)
     cells = np.stack(np.meshgrid(*(np.arange(n) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3) * size
@@ -179,9 +180,11 @@ def _octree(
 def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
     """Make the tets that join the centres of leaves that share a face: (k, 3) points, and (m, 4) tets.
 
-    Points, and the upper corner of the lattice, `upper`, are in half cells of the finest level.
+    Leaves have (n, 3) lower `corners` and (n,) `sizes`, powers of two. These, points, and the upper corner of the
+    lattice, `upper`, (3,), are in half cells of the finest level.
     """
     stride = np.array([(upper[1] + 1) * (upper[2] + 1), upper[2] + 1, 1])
+    # sorted keys of leaves: the corner, and the binary logarithm of the size, below 32
     leaves = np.sort((corners * 32 + np.log2(sizes).astype(np.int64)[:, None] * [0, 0, 1]) @ stride)
 
     def is_leaf(corner: Ints, size: Ints) -> Bools:
@@ -211,11 +214,10 @@ def _join_leaves(corners: Ints, sizes: Ints, upper: Ints) -> tuple[Ints, Ints]:
         for k in range(4):
             start, end = face[:, k], face[:, (k + 1) % 4]
             middle = (start + end) // 2
-            split = places_among(occupied, middle @ stride) >= 0
-            whole = ~split
-            for ends, which in (((start, end), whole), ((start, middle), split), ((middle, end), split)):
-                parts = (center[chosen], opposite[chosen], *ends)
-                joined.append(np.stack([part[which] @ stride for part in parts], axis=1))
+            is_split = places_among(occupied, middle @ stride) >= 0  # by a corner of a smaller leaf
+            for ends, rows in (((start, end), ~is_split), ((start, middle), is_split), ((middle, end), is_split)):
+                tet_corners = (center[chosen], opposite[chosen], *ends)
+                joined.append(np.stack([corner[rows] @ stride for corner in tet_corners], axis=1))
     keys, ids = np.unique(np.concatenate(joined), return_inverse=True)
     points = np.stack([keys // stride[0], keys % stride[0] // stride[1], keys % stride[1]], axis=1)
     tets = ids.reshape(-1, 4)
