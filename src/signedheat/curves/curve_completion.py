@@ -201,22 +201,22 @@ def signed_along_boundary(triangles: IntrinsicMesh, values: Floats) -> None:
     beyond both of its ends. If those signs differ, it gets the sign opposite to that of its neighbours.
     """
     least = 1e-7 * float(triangles.lengths_of_edges.mean())
-    zero, ends = np.abs(values) <= least, triangles.edges.vertices
-    rim = ends[triangles.edges.face_counts == 1]
-    row = connected_components(len(values), *rim[zero[rim].all(axis=1)].T)
-    in_row = mask_of(len(values), rim[zero[rim]])
+    is_zero, edges = np.abs(values) <= least, triangles.edges.vertices
+    rim = edges[triangles.edges.face_counts == 1]
+    run = connected_components(len(values), *rim[is_zero[rim].all(axis=1)].T)
+    in_run = mask_of(len(values), rim[is_zero[rim]])
 
     def neighbor_signs(edges: Ints) -> Floats:
-        """Return (n,) sums of the signs of φ at the far ends of edges that leave each run of zeros."""
+        """Return (n,) sums of the signs of φ at the far ends of (k, 2) edges that leave each run of zeros."""
         tail, head = np.concatenate([edges, edges[:, ::-1]]).T
-        out = in_row[tail] & ~zero[head]
-        return np.bincount(row[tail[out]], np.sign(values[head[out]]), len(values)).astype(float)
+        leaves = in_run[tail] & ~is_zero[head]
+        return np.bincount(run[tail[leaves]], np.sign(values[head[leaves]]), len(values)).astype(float)
 
-    beyond, nearby = neighbor_signs(rim), neighbor_signs(ends)
-    long = np.bincount(row[in_row], minlength=len(values)) > 1
-    side = np.where(np.abs(beyond) > 1, np.sign(beyond), np.where(long, -np.sign(nearby), 0.0))[row]
-    chosen = in_row & (side != 0)
-    values[chosen] = least * side[chosen]
+    at_ends, all_around = neighbor_signs(rim), neighbor_signs(edges)
+    has_edges = np.bincount(run[in_run], minlength=len(values)) > 1
+    sign = np.where(np.abs(at_ends) > 1, np.sign(at_ends), np.where(has_edges, -np.sign(all_around), 0.0))[run]
+    chosen = in_run & (sign != 0)
+    values[chosen] = least * sign[chosen]
 
 
 def length(mesh: TriangleMesh, curve: Curve) -> float:

@@ -474,7 +474,10 @@ def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: floa
 
 @compiled
 def trim(a: Floats, b: Floats) -> None:
-    """Trim two overlapping windows in place to the parts in which each has the smaller distance; a begins first."""
+    """Trim two overlapping windows in place to the parts in which each has the smaller distance; a begins first.
+
+    No window is divided: if b is nearer in the middle of a, both stay.
+    """
     if b[S0] >= a[S1]:
         return
     low, high = b[S0], min(a[S1], b[S1])
@@ -660,10 +663,11 @@ class Search(NamedTuple):
         n, m = triangles.n_vertices, triangles.n_faces
         queue, lists = Queue.empty(3 * m + n), (np.full(3 * m, -1), np.full(3 * m, -1))
         windows, following = np.empty((room, 6)), np.empty(room, dtype=np.int64)
-        counts = np.array([1, -1, 0, 0])
-        across = triangles.edges.face_counts[triangles.edges.face_edges]  # side k + 1 is opposite to corner k
-        of_vertices = np.bincount(triangles.corner_vertices.ravel(), np.roll(across, -1, axis=1).ravel(), n)
-        most = np.concatenate([np.repeat(1 + across.sum(axis=1), 3), of_vertices.astype(np.int64)])
+        counts = np.array([1, -1, 0, 0])  # the work row is in use, no row is free
+        # waves go on into the faces at other sides; from a vertex, at opposite sides, k + 1 of corner k
+        faces_at_sides = triangles.edges.face_counts[triangles.edges.face_edges]
+        of_vertices = np.bincount(triangles.corner_vertices.ravel(), np.roll(faces_at_sides, -1, axis=1).ravel(), n)
+        most = np.concatenate([np.repeat(1 + faces_at_sides.sum(axis=1), 3), of_vertices.astype(np.int64)])
         return cls(np.full(n, np.inf), pseudosources, queue, *lists, windows, following, counts, most)
 
     def larger(self) -> Search:

@@ -141,22 +141,24 @@ class PlacedSegments:
         return GeodesicSources(self.nodes.elements[at_vertex], faces, starts, stops, *self._fans(triangles))
 
     def _fans(self, triangles: IntrinsicMesh) -> tuple[Ints, Complexes, Complexes, Complexes]:
-        """Return the faces, points, first and second directions of fans at nodes in faces and on edges.
+        """Return (f,) faces, (f,) points, and (f,) first and second directions of fans at nodes in faces and on edges.
 
-        A node on an edge has a fan in every face at the edge.
+        Points and directions are complex numbers, in the layouts of the faces. A node on an edge has a fan in every
+        face at the edge.
         """
         nodes = self.nodes
-        first, second = self._directions(triangles)
+        directions = self._directions(triangles)
         inside, on_edge = np.flatnonzero(nodes.kinds == FACE), np.flatnonzero(nodes.kinds == EDGE)
         owners, halfedges = halfedges_of(triangles, nodes.elements[on_edge])
-        faces, k, node = halfedges // 3, halfedges % 3, on_edge[owners]
-        home = nodes.elements[inside]
-        points = (nodes.barycentric[inside] * triangles.corner_positions[nodes.faces[inside]]).sum(axis=1)
+        edge_faces, sides, edge_nodes = halfedges // 3, halfedges % 3, on_edge[owners]
+        in_faces = (nodes.barycentric[inside] * triangles.corner_positions[nodes.faces[inside]]).sum(axis=1)
+        on_edges = on_sides(triangles, edge_faces, sides, nodes.along[edge_nodes][:, None])[:, 0]
         firsts, seconds = (
-            np.concatenate([d[inside], triangles.from_edge_frames(d[node], faces, k)]) for d in (first, second)
+            np.concatenate([d[inside], triangles.from_edge_frames(d[edge_nodes], edge_faces, sides)])
+            for d in directions
         )
-        across = on_sides(triangles, faces, k, nodes.along[node][:, None])[:, 0]
-        return np.concatenate([home, faces]), np.concatenate([points, across]), firsts, seconds
+        faces = np.concatenate([nodes.elements[inside], edge_faces])
+        return faces, np.concatenate([in_faces, on_edges]), firsts, seconds
 
     def _directions(self, triangles: IntrinsicMesh) -> tuple[Complexes, Complexes]:
         """Return (s,) unit vectors along the first segment at each node, and along the last, 0 if there is none.
@@ -166,12 +168,13 @@ class PlacedSegments:
         nodes, kinds = self.nodes, self.nodes.kinds
         steps = self.positions[:, 1] - self.positions[:, 0]
         steps /= np.abs(steps)
-        node, seg = self.ends.T.ravel(), np.tile(np.arange(len(self.ends)), 2)
-        away = np.concatenate([steps, -steps])
+        node, seg = self.ends.T.ravel(), np.tile(np.arange(len(self.ends)), 2)  # of both ends of all segments
+        away = np.concatenate([steps, -steps])  # directions from there
         at_edge = np.flatnonzero(kinds[node] == EDGE)
         faces, edges = self.faces[seg[at_edge]], nodes.elements[node[at_edge]]
         along = np.repeat(nodes.along[node[at_edge]], 3)[:, None]
         on_each_side = on_sides(triangles, np.repeat(faces, 3), np.tile(np.arange(3), len(faces)), along)
+        # of the sides that are this edge, the one on which the end lies
         gap = np.abs(on_each_side.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
         k = np.where(triangles.edges.face_edges[faces] == edges[:, None], gap, np.inf).argmin(axis=1)
         away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)

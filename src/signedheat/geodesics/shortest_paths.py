@@ -114,8 +114,8 @@ class Routes(NamedTuple):
         n, corners = triangles.n_edges, triangles.corner_positions
         sides = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
         middles = 0.5 * (corners + np.roll(corners, -1, axis=1))
-        spread = np.arange(n) * 0.6180339887498949
-        tolls = 1.0 + TOLL_RANGE * (spread - np.floor(spread))
+        multiples = np.arange(n) * 0.6180339887498949  # of the golden ratio, whose fractions are spread evenly
+        tolls = 1.0 + TOLL_RANGE * (multiples - np.floor(multiples))
         return cls(np.full(n, np.inf), *sides, Queue.empty(n), middles.ravel(), tolls)
 
 
@@ -164,8 +164,9 @@ TOLL_RANGE = 1e-9
 def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pair: int) -> tuple[Ints, Ints]:
     """Find the sleeve of the shortest path through midpoints of edges between the two points of a pair.
 
-    Returns (k,) halfedges by which it leaves faces, and (k,) halfedges by which it enters the next; empty if there is
-    no path.
+    A path goes straight from a point to the midpoint of a side of its face, on through midpoints, and straight to the
+    other point; `routes` are found by Dijkstra's algorithm. Returns (k,) halfedges by which it leaves faces, and (k,)
+    halfedges by which it enters the next; empty if there is no path.
     """
     cost, leave, enter, queue, middles, tolls = routes
     edge_of, touched = faces.edges.ravel(), [0]
@@ -288,7 +289,8 @@ def other_way(
 ) -> tuple[Ints, Ints]:
     """Return the sleeve that passes the vertex at a bend on its other side, or empty arrays if no faces connect there.
 
-    `bend` is the portal at which the path bends, and `point` the position of the vertex.
+    The sleeve leaves faces through the halfedges `left`, and enters the next through `entered`; its portals are those
+    of `unfold`. `bend` is the portal at which the path bends, and `point` the position of the vertex.
     """
     first = last = bend  # portals that end at the vertex
     while first > 0 and (portals[first - 1, 0] == point or portals[first - 1, 1] == point):
@@ -355,7 +357,9 @@ def _straighten(
 ) -> tuple[Ints, Floats]:
     """Shorten the path in a sleeve by passing the vertices of its bends on their other sides, where that helps.
 
-    Returns (k,) the halfedges that the path crosses, and (k,) the fractions of them at which it does.
+    The sleeve leaves faces through the halfedges `left`, enters the next through `entered`, and joins the `pair` of
+    points from `starts` and `ends`. Returns (k,) the halfedges that the path crosses, and (k,) the fractions of them at
+    which it does.
     """
     portals, begin, end, bends, bend_ends, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0

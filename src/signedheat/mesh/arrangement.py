@@ -611,6 +611,24 @@ def _sort(ids: list[int], keys: Floats) -> None:
 
 
 @compiled
+def _common(members: Ints, starts: Ints, f: int, g: int) -> list[int]:
+    """List the points that are in both of two faces, whose points ``members[starts[f] : starts[f + 1]]`` ascend."""
+    common = [np.int64(0)]
+    common.pop()
+    i, j = starts[f], starts[g]
+    while i < starts[f + 1] and j < starts[g + 1]:
+        if members[i] == members[j]:
+            common.append(members[i])
+            i += 1
+            j += 1
+        elif members[i] < members[j]:
+            i += 1
+        else:
+            j += 1
+    return common
+
+
+@compiled
 def _segments(
     points: Floats, starts: Ints, members: Ints, face_edges: Ints, chains: Chains, pairs: Ints, straight: Floats
 ) -> tuple[Ints, Ints]:
@@ -618,27 +636,17 @@ def _segments(
 
     Points of face f are ``members[starts[f] : starts[f + 1]]``, ascending. If the common points of two faces are within
     `straight`, (m,), of a line, the faces meet along that line. Otherwise they lie in one plane, and meet along the
-    edges of one that lie in the other. Returns (r, 4) parts of lines in faces, as rows of face, line and two ends, and
-    (s, 2) the two faces of each line that is no edge.
+    edges of one that lie in the other. `chains` are the edges, and `face_edges`, (m, 3), those of faces. Returns (r, 4)
+    parts of lines in faces, as rows of face, line and two ends, and (s, 2) the two faces of each line that is no edge.
     """
     records, sides = [(0, 0, 0, 0)], [(0, 0)]
     ends = chains.ends
     for r in range(len(pairs)):
         f, g = pairs[r, 0], pairs[r, 1]
-        common = [np.int64(0)]
-        common.pop()
-        i, j = starts[f], starts[g]
-        while i < starts[f + 1] and j < starts[g + 1]:
-            if members[i] == members[j]:
-                common.append(members[i])
-                i += 1
-                j += 1
-            elif members[i] < members[j]:
-                i += 1
-            else:
-                j += 1
+        common = _common(members, starts, f, g)
         if len(common) < 2:
             continue
+        # p and q are far apart: q is farthest from p, which is farthest from the first
         p, q = common[0], common[0]
         for _ in range(2):
             most = -1.0
@@ -649,7 +657,7 @@ def _segments(
             p, q = q, p
         p, q = q, p
         square, widest = _product(points, p, q, p, q), 0.0
-        shares = np.empty(len(common))
+        shares = np.empty(len(common))  # of the way from p to q
         for c in range(len(common)):
             shares[c], off = _product(points, p, common[c], p, q) / square, 0.0
             for d in range(3):
@@ -657,6 +665,7 @@ def _segments(
                 off += (points[common[c], d] - points[p, d] - shares[c] * way) ** 2
             widest = max(widest, np.sqrt(off))
         if widest <= min(straight[f], straight[g]):
+            # along the line, each stretch between points is an edge of one face, of both, or else a new line
             _sort(common, shares)
             for c in range(len(common) - 1):
                 a, b = common[c], common[c + 1]

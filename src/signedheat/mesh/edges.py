@@ -62,7 +62,7 @@ def pair_halfedges(tails: Ints, heads: Ints, n_vertices: int, used: Bools | None
 
 
 def orient_faces(faces: Ints, weights: Floats, n_vertices: int, used: Bools | None = None) -> FaceOrientation:
-    """Find the triangles to flip so that neighbours across edges of two triangles have consistent orientations.
+    """Find the (m, 3) triangles to flip so that neighbours across edges of two have consistent orientations.
 
     Faces for which `used`, (m,), is false do not count. In each connected part, the orientation with the larger sum of
     `weights`, (m,), is kept.

@@ -77,16 +77,19 @@ def best_signs(weights: Floats, first: Floats) -> Floats:
 
 
 def _flipped_in_groups(weights: Floats, groups: list[Ints], signs: Floats) -> Floats:
-    """Negate groups of (n,) signs, one after the other, that then agree more with all others; return the signs."""
+    """Negate groups of (n,) signs, one after the other, that then agree more with all others; return the signs.
+
+    `weights`, (n, n), are positive between nodes whose signs should be equal, and negative where opposite.
+    """
     agreement, least = weights @ signs, 1e-12 * float(np.abs(weights).sum())
     for _ in range(FLIP_ROUNDS):
         any_flipped = False
         for group in groups:
-            own = signs[group]
-            outside = float(own @ agreement[group] - own @ weights[np.ix_(group, group)] @ own)
-            if outside < -least:
-                signs[group] = -own
-                agreement -= 2 * weights[:, group] @ own
+            group_signs = signs[group]
+            within = group_signs @ weights[np.ix_(group, group)] @ group_signs
+            if float(group_signs @ agreement[group] - within) < -least:
+                signs[group] = -group_signs
+                agreement -= 2 * weights[:, group] @ group_signs
                 any_flipped = True
         if not any_flipped:
             break

@@ -154,7 +154,10 @@ def _is_single(points: Floats) -> bool:
 
 
 def _rounding(points: Floats, parts: Ints, n: int, digits: int) -> Floats:
-    """Return (n, 3) the last place of the largest coordinate of each part; 0 along axes where no part uses it."""
+    """Return (n, 3) the last place of the largest coordinate of each of n parts; 0 along axes where no part uses it.
+
+    `parts` are the part of each point, and coordinates have numbers of `digits` binary digits.
+    """
     result = np.zeros((n, 3))
     for axis, coordinates in enumerate(points.T):
         largest = np.zeros(n)

@@ -1,4 +1,12 @@
-"""Nearest points of a triangle, and the nearest of many triangles by a tree of boxes."""
+"""Nearest points of a triangle, and the nearest of many triangles by a tree of boxes.
+
+The nearest point of a triangle to a point is called its foot. The feature of a foot is 0 inside the triangle, 1, 2, 3
+on its edges (corner 0–1, 1–2, 2–0), and 4, 5, 6 at its corners 0, 1, 2.
+
+Kernels take triangles as ``rows``, (m, 16). Columns 0–2 are the first corner, 3–5 and 6–8 the unit vectors along the
+first side and across it in the plane. In these axes, (p, q), column 9 is the length of the first side, 10–11 and 12 are
+the direction and length of side 0–2, and 13–14 and 15 those of side 1–2.
+"""
 
 from __future__ import annotations
 
@@ -13,9 +21,6 @@ from ..compiled import compiled
 from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree
 from ..parallel import in_chunks
 
-# The nearest point of a triangle to a point is called its foot. The feature of a foot is 0 inside the triangle, 1, 2, 3
-# on its edges (corner 0–1, 1–2, 2–0), and 4, 5, 6 at its corners 0, 1, 2.
-
 LEAST_HEIGHT = 1e-14
 """Height of a triangle, relative to its length, up to which it counts as 0, since rounding would decide its plane."""
 POINTS_TOGETHER = 8
@@ -25,19 +30,14 @@ much again."""
 
 
 def triangle_rows(corners: Floats) -> Floats:
-    """Return (m, 16) numbers of triangles, with (m, 9) coordinates of corners, that `foot_on_triangle` needs.
-
-    Columns 0–2 are the first corner, 3–5 and 6–8 the unit vectors along the first side and across it in the plane, 9
-    the length of the first side, 10–11 and 12 the direction in these axes and the length of side 0–2, and 13–14 and 15
-    those of side 1–2.
-    """
+    """Return the (m, 16) rows of triangles with (m, 9) coordinates of corners."""
     (rows,) = in_chunks(lambda chunk: (_rows(chunk),), corners)
     return rows
 
 
 @np.errstate(all="ignore")
 def _rows(corners: Floats) -> Floats:
-    """Return the (m, 16) rows that `triangle_rows` describes, for (m, 9) corners of triangles, without threads."""
+    """Return the (m, 16) rows of triangles with (m, 9) coordinates of corners, without threads."""
     rows = np.empty((len(corners), 16))
     rows[:, :3] = corners[:, :3]
     u, v = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))
@@ -72,7 +72,7 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
     """Find the foot of a point (x, y, z) on triangle f, the triangle's nearest point.
 
     Returns the squared distance, the feature of the foot (0 inside, 1 to 3 on edges, 4 to 6 at corners), and its three
-    coordinates. `rows` are those of `triangle_rows`.
+    coordinates.
     """
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
     p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
@@ -114,8 +114,9 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
 def away_from_triangle(rows: Floats, f: int, points: Floats, at: int, out: Floats) -> None:
     """Write squared distances of points to triangle f, and the vectors from their feet, to ``out[at]``, (4, n).
 
-    `points` are the coordinates of the points, (3, n). This is `foot_on_triangle` without branches. The compiler
-    vectorises the loop over points if it does not know their number.
+    `points` are the coordinates of the points, (3, n). This is `foot_on_triangle` without branches: the least distance
+    from the three sides, or 0 in the plane if the point is beyond none of them. The compiler vectorises the loop over
+    points if it does not know their number.
     """
     ax, ay, az = rows[f, 0], rows[f, 1], rows[f, 2]
     ux, uy, uz = rows[f, 3], rows[f, 4], rows[f, 5]
@@ -151,8 +152,8 @@ def away_from_triangle(rows: Floats, f: int, points: Floats, at: int, out: Float
         other = i * i + j * j
         nearer = other < square
         a, b, square = i if nearer else a, j if nearer else b, other if nearer else square
-        above = beyond < 0.0
-        a, b, square = 0.0 if above else a, 0.0 if above else b, 0.0 if above else square
+        is_over = beyond < 0.0
+        a, b, square = 0.0 if is_over else a, 0.0 if is_over else b, 0.0 if is_over else square
         out[at, 0, k] = square + up * up
         out[at, 1, k] = up * nx + a * ux + b * vx
         out[at, 2, k] = up * ny + a * uy + b * vy
@@ -223,8 +224,8 @@ def nearest_faces(
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return (n,) the nearest triangle of each of (n, 3) points, and (n,) the squares of their distances.
 
-    `rows` are those of `triangle_rows`, and `discs` those of `FaceTree.discs`. The search for a point starts with the
-    triangle of the point before, except after every `run` points.
+    `discs` are those of `FaceTree.discs`. The search for a point starts with the triangle of the point before, except
+    after every `run` points.
     """
     return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), POINTS_TOGETHER)))
 
@@ -235,13 +236,15 @@ def _descend(
 ) -> tuple[NDArray[np.int32], Floats]:
     """Return (n,) the nearest triangle of each point and (n,) its squared distance, by descending a tree.
 
-    Successive points descend together, as many as the work array `best` is long. The compiler must not know this
-    number.
+    `discs` are those of `FaceTree.discs`, and `run` that of `nearest_faces`. Successive points descend together, as
+    many as the work array `best` is long, which has their least squared distances so far. The compiler must not know
+    this number.
     """
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
     leaves, together, middle = len(bounds) // 2, len(best), len(best) // 2
     coordinates, which = np.empty((3, together)), np.zeros(together, dtype=np.int64)
+    # nodes still to be visited, and how near the triangles in them can be to each point, squared
     stack, gaps = np.empty(66, dtype=np.int64), np.zeros((66, together))
     for begin in range(0, len(points), together):
         last = which[together - 1]

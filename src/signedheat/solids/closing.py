@@ -467,7 +467,10 @@ def fan(points: Ints) -> Ints:
 
 
 def strips(vertices: Floats, faces: Ints, outlines: Ints = NO_EDGES) -> Ints:
-    """(k, 3) triangles of strips between boundary loops that run along each other, in part or all around."""
+    """(k, 3) triangles of strips between boundary loops that run along each other, in part or all around.
+
+    Boundary edges of the (m, 3) faces among `outlines`, (k, 2), stay open.
+    """
     surface = _Surface(vertices, faces, outlines)
     chain = np.concatenate([faces, *walls.seams(_rims(surface))])
     surface = _Surface(vertices, chain, outlines)

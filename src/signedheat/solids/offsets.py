@@ -238,23 +238,26 @@ class SheetWall:
         return depths if self.rim is None else np.maximum(depths, self._beyond(points, nearest))
 
     def _beyond(self, points: Floats, nearest_points: NearestFaces) -> Floats:
-        """(n,) distances of (n, 3) points beyond the rim, negative over the surface, given their nearest points."""
+        """(n,) distances of (n, 3) points beyond the rim, negative over the surface, given their nearest points.
+
+        If the nearest point is on the rim, it is the height above the plane that stands on the rim there. Otherwise it
+        is the distance of the nearest point from the rim.
+        """
         # features are 0 within a face, 1 to 3 on its sides, and 4 to 6 at its corners
         faces, features = nearest_points.faces, nearest_points.features
-        rim_sides = np.full((len(points), 2), -1)
-        edges, vertices = (features > 0) & (features < 4), features > 3
-        rim_sides[edges] = self.sides[faces[edges], features[edges] - 1][:, None]
-        rim_sides[vertices] = self.at_vertices[self.tree.features.faces[faces[vertices], features[vertices] - 4]]
+        rim_sides = np.full((len(points), 2), -1)  # the sides of the rim at the nearest point: one twice, two, or none
+        on_side, at_corner = (features > 0) & (features < 4), features > 3
+        rim_sides[on_side] = self.sides[faces[on_side], features[on_side] - 1][:, None]
+        rim_sides[at_corner] = self.at_vertices[self.tree.features.faces[faces[at_corner], features[at_corner] - 4]]
         # at vertices, the end of the side that ends there, and the begin of the one that begins there
         shares = np.broadcast_to([1.0, 0.0], rim_sides.shape).copy()
-        sides = rim_sides[edges, 0]
-        begin, end = self.corners[sides].swapaxes(0, 1)
-        along = np.linalg.norm(nearest_points.places[edges] - begin, axis=1) / np.linalg.norm(end - begin, axis=1)
-        shares[edges] = along[:, None]
+        begin, end = self.corners[rim_sides[on_side, 0]].swapaxes(0, 1)
+        from_begin = np.linalg.norm(nearest_points.places[on_side] - begin, axis=1)
+        shares[on_side] = (from_begin / np.linalg.norm(end - begin, axis=1))[:, None]
         outward = self.outward[rim_sides]
         outward = outward[:, :, 0] + shares[..., None] * (outward[:, :, 1] - outward[:, :, 0])
         beyond = np.einsum("nki,ni->nk", outward, points - nearest_points.places).max(axis=1)
-        over = np.flatnonzero((rim_sides < 0).all(axis=1))
+        over = np.flatnonzero((rim_sides < 0).all(axis=1))  # points over the surface
         nearest, weights = cast("TriangleTree", self.rim).nearest(nearest_points.places[over])
         ends = self.corners[nearest]
         on_rim = ends[:, 0] + (1 - weights[:, :1]) * (ends[:, 1] - ends[:, 0])

@@ -74,28 +74,30 @@ def is_within(mesh: TriangleMesh, other: TriangleMesh, distance: float) -> bool:
 def _divided(pieces: Floats, rows: Floats, least: float) -> Floats:
     """(k, 3, 3) triangles that (n, 3, 3) triangles are divided into, for `is_within`.
 
-    `rows` are those of the nearest triangles in `FaceFeatures`. A triangle is cut by the plane that stands on a side of
-    the nearest one, if it reaches farther than `least` to both sides of it. If not, or if it is more than three times
-    as large as the nearest one, it is halved.
+    `rows` are the `triangle_rows` of the nearest triangles: see there. A triangle is cut by the plane that stands on a
+    side of the nearest one, if it reaches farther than `least` to both sides of it. If not, or if it is more than three
+    times as large as the nearest one, it is halved.
     """
     relative = pieces - rows[:, None, :3]
+    # coordinates of corners in the plane of the nearest triangle, along its first side and across
     p = (relative * rows[:, None, 3:6]).sum(axis=2)
     q = (relative * rows[:, None, 6:9]).sum(axis=2)
-    first, c, d, g, h = (rows[:, k, None] for k in (9, 10, 11, 13, 14))
-    beyond = np.stack([-q, q * c - p * d, (p - first) * h - q * g], axis=1)
-    shorter = np.minimum(beyond.max(axis=2), -beyond.min(axis=2))
-    side = shorter.argmax(axis=1)
+    length, (px, qx), (py, qy) = rows[:, 9, None], rows[:, 10:12].T[..., None], rows[:, 13:15].T[..., None]
+    # (n, 3, 3) distances of each corner beyond the three sides
+    beyond = np.stack([-q, q * px - p * qx, (p - length) * qy - q * py], axis=1)
+    shorter_reach = np.minimum(beyond.max(axis=2), -beyond.min(axis=2))
+    side = shorter_reach.argmax(axis=1)
     row = np.arange(len(pieces))
-    large = side_lengths(pieces).max(axis=1) > 3.0 * rows[:, [9, 12, 15]].max(axis=1)
-    cut = ~large & (shorter[row, side] > least)
-    return np.concatenate([_cut(pieces[cut], beyond[row, side][cut]), halved(pieces[~cut])])
+    is_large = side_lengths(pieces).max(axis=1) > 3.0 * rows[:, [9, 12, 15]].max(axis=1)
+    is_cut = ~is_large & (shorter_reach[row, side] > least)
+    return np.concatenate([_cut(pieces[is_cut], beyond[row, side][is_cut]), halved(pieces[~is_cut])])
 
 
 def _cut(pieces: Floats, heights: Floats) -> Floats:
     """(3 n, 3, 3) triangles: each of n is cut in three where the (n, 3) heights of its corners change sign."""
     above = heights > 0
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), above.argmin(axis=1))
-    order = (alone[:, None] + np.arange(3)) % 3
+    order = (alone[:, None] + np.arange(3)) % 3  # first the corner that is alone on its side
     a, b, c = np.take_along_axis(pieces, order[:, :, None], axis=1).swapaxes(0, 1)
     height_a, height_b, height_c = np.take_along_axis(heights, order, axis=1).T[:, :, None]
     on_b, on_c = a + height_a / (height_a - height_b) * (b - a), a + height_a / (height_a - height_c) * (c - a)

@@ -130,16 +130,16 @@ class IntrinsicTriangulation(Displayed, Frozen, LinearDomain):
 
         Barycentric coordinates are the weights, with sum 1, of the corners of a face.
         """
-        old = self.mesh.faces
-        faces, weights = np.full(self.mesh.n_vertices, -1), np.zeros((self.mesh.n_vertices, 3))
+        mesh_faces, n = self.mesh.faces, self.mesh.n_vertices
+        faces, weights = np.full(n, -1), np.zeros((n, 3))
         for k in range(3):
-            faces[old[:, k]], weights[old[:, k]] = np.arange(len(old)), np.eye(3)[k]
-        cut = self.refinement.triangles
-        extra, corner = np.unique(cut.corner_vertices.ravel(), return_index=True)
-        corner = corner[extra >= self.mesh.n_vertices]
-        put = self.refinement.pull_back(corner // 3, np.eye(3)[corner % 3])
-        new = self.refinement.pull_back(*self.history.inserted())
-        return np.concatenate([faces, put[0], new[0]]), np.concatenate([weights, put[1], new[1]])
+            faces[mesh_faces[:, k]], weights[mesh_faces[:, k]] = np.arange(len(mesh_faces)), np.eye(3)[k]
+        # then the vertices where curves cut faces, each at some corner of the cut faces, and those of the refinement
+        vertices, corners = np.unique(self.refinement.triangles.corner_vertices.ravel(), return_index=True)
+        corners = corners[vertices >= n]
+        at_cuts = self.refinement.pull_back(corners // 3, np.eye(3)[corners % 3])
+        inserted = self.refinement.pull_back(*self.history.inserted())
+        return np.concatenate([faces, at_cuts[0], inserted[0]]), np.concatenate([weights, at_cuts[1], inserted[1]])
 
     @cached_property
     def corner_angles(self) -> Floats:

@@ -103,7 +103,7 @@ def joined_triangles(planes: TangentPlanes) -> tuple[Ints, Ints]:
 
 
 def islands(planes: TangentPlanes, faces: Ints) -> Bools:
-    """(n,) whether each point is in a component smaller than a neighbourhood, next to points of another side."""
+    """(n,) whether each point is in a component of (m, 3) faces smaller than a neighbourhood, near another side."""
     n, k = planes.neighbors.shape
     tail, head = edge_table(faces).vertices.T
     part = connected_components(n, tail, head)
@@ -357,14 +357,17 @@ def split_at_points_left(points: Floats, faces: Ints, candidates: Ints) -> Ints:
 
 
 def aligned(axes: Floats, faces: Ints, normals: Floats, given: Floats) -> Ints:
-    """(n,) signs that orient (n, 3) axes consistently across edges and like `normals`, and components like `given`."""
+    """(n,) signs that orient (n, 3) axes consistently across edges and like `normals`, and components like `given`.
+
+    Both are (n, 3) unit vectors; edges are those of (m, 3) faces.
+    """
     n = len(axes)
     tail, head = edge_table(faces).vertices.T
     parts = connected_components(n, tail, head)
     across = (axes[tail] * axes[head]).sum(axis=1)
     links = Links(tail, head, across * np.abs(across))  # creases weigh little
-    own = (axes * normals).sum(axis=1)  # estimates, node n, weigh as much as a neighbour in the same plane
-    node_signs = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), own)), n + 1)
+    agreement = (axes * normals).sum(axis=1)  # with estimates, node n, weighs as much as a neighbour in the same plane
+    node_signs = signs_of(Links.joined(links, Links(np.arange(n), np.full(n, n), agreement)), n + 1)
     signs = (node_signs[:n] * node_signs[n]).astype(np.int64)
     preference = np.bincount(parts, signs * (axes * given).sum(axis=1))
     return np.where(preference < 0, -1, 1)[parts] * signs
@@ -477,7 +480,10 @@ HOLE_SIDES = 12
 
 
 def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
-    """(k, 3) triangles that fill holes of at most `HOLE_SIDES` sides, without diagonals that are already edges."""
+    """(k, 3) triangles that fill holes of at most `HOLE_SIDES` sides, without diagonals that are already edges.
+
+    Points and unit normals are (n, 3), faces (m, 3).
+    """
     edges = edge_table(faces)
     face, side = np.nonzero(edges.face_counts[edges.face_edges] == 1)
     tails, heads = faces[face, side], faces[face, (side + 1) % 3]
@@ -497,7 +503,8 @@ def hole_fillings(points: Floats, normals: Floats, faces: Ints) -> Ints:
 def next_around_gap(points: Floats, normals: Floats, tails: Ints, heads: Ints) -> Ints:
     """(b,) the boundary edge that follows each around the gap to its right, or −1.
 
-    Edges have (b,) tails and heads. Of several, it is the first counter-clockwise as seen from the normal.
+    Edges have (b,) tails and heads among (n, 3) points with unit normals. Of several, it is the first counter-clockwise
+    as seen from the normal.
     """
     arriving, onward = members_of(*grouped(tails, len(points)), heads)
     vertices = heads[arriving]
@@ -527,7 +534,7 @@ def _loop_from(start: int, following: Ints) -> list[int]:
 def _filling(points: Floats, normals: Floats, loop: list[int], existing: set[tuple[int, int]]) -> list[list[int]]:
     """Triangulate a hole, whose vertices are listed counter-clockwise; return no triangles if that is not possible.
 
-    Its diagonals must not be among the `existing` edges, to which they are added.
+    Points and unit normals are (n, 3). Its diagonals must not be among the `existing` edges, to which they are added.
     """
     if len(set(loop)) < max(len(loop), 3):
         return []

@@ -120,7 +120,7 @@ def share_of_two_sides(points: Floats, normals: Floats) -> float:
     tree = PointTree(points)
 
     def two_sided(tried: Ints) -> tuple[Bools]:
-        """(k,) whether the neighbours of points lie on two sides."""
+        """(k,) whether the neighbours of points with ids `tried`, (k,), lie on two sides of a fitted quadric."""
         distances, near = tree.query(points[tried], k=k + 1)
         offsets, normal = points[near] - points[tried, None], normals[tried]
         weights = np.exp(-((distances / distances[:, -1:]) ** 2)) * (np.einsum("nkd,nd->nk", normals[near], normal) > 0)
@@ -130,8 +130,8 @@ def share_of_two_sides(points: Floats, normals: Floats) -> float:
         terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=2)
         moments = np.einsum("nka,nk,nkb->nab", terms, weights, terms) + 1e-9 * np.eye(6)
         factors = np.linalg.solve(moments, np.einsum("nka,nk,nk->na", terms, weights, z)[..., None])
-        apart, total = np.abs(z - (terms @ factors)[..., 0]), weights.sum(axis=1)
-        mean, root = (weights * apart).sum(axis=1) / total, np.sqrt((weights * apart**2).sum(axis=1) / total)
+        heights, total = np.abs(z - (terms @ factors)[..., 0]), weights.sum(axis=1)  # above the quadric
+        mean, root = (weights * heights).sum(axis=1) / total, np.sqrt((weights * heights**2).sum(axis=1) / total)
         enough = (weights > 0).sum(axis=1) > k / 2
         return ((mean > TWO_SIDES * root) & (root > ONE_SIDE) & enough,)
 
