@@ -248,10 +248,10 @@ class CutSurface(LinearDomain, Frozen):
         `phi` are values at the corners of the triangles, (m, 3). Returns the polygons and the values at their vertices.
         """
         triangles, n = self.triangles, surface.n_vertices
-        polygons, owners, where = subdivided(surface)
+        polygons, owners, edge_crossings = subdivided(surface)
         sizes = [len(polygon) for polygon in polygons]
         node, face = np.concatenate(polygons), np.repeat(owners, sizes)
-        at_vertices, on = np.flatnonzero(node < n), np.flatnonzero(node >= n)  # corners at vertices; where edges cross
+        at_vertices, at_crossings = np.flatnonzero(node < n), np.flatnonzero(node >= n)  # corners of polygons
 
         # values at all corners, and keys: corners with the same key become one vertex
         owner = self.split_vertices[0]
@@ -259,16 +259,18 @@ class CutSurface(LinearDomain, Frozen):
         corner = 3 * face[at_vertices] + (
             triangles.corner_vertices[face[at_vertices]] == node[at_vertices, None]
         ).argmax(axis=1)
-        places = where[node[on] - n]
+        places = edge_crossings[node[at_crossings] - n]
         on_cut = mask_of(triangles.n_edges, self.pairs.edges[self.is_cut])
         values, keys = np.empty(len(node)), np.zeros((len(node), 2), dtype=np.int64)
         values[at_vertices], keys[at_vertices, 1] = at_corners.ravel()[corner], owner[corner]
-        values[on] = (at_corners[face[on]] * barycentric_in(triangles, face[on], places)).sum(axis=1)
-        keys[on, 0], keys[on, 1] = 1 + node[on], np.where(on_cut[places.elements], face[on], -1)
+        weights = barycentric_in(triangles, face[at_crossings], places)
+        values[at_crossings] = (at_corners[face[at_crossings]] * weights).sum(axis=1)
+        keys[at_crossings, 0] = 1 + node[at_crossings]
+        keys[at_crossings, 1] = np.where(on_cut[places.elements], face[at_crossings], -1)
 
         # a vertex for each key, and the polygons between these
         _, first, vertex = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-        space = np.concatenate([surface.vertices, positions(surface, where)])
+        space = np.concatenate([surface.vertices, positions(surface, edge_crossings)])
         ends = np.cumsum([0, *sizes])
         mesh = PolygonMesh(space[node[first]], [vertex[a:b] for a, b in pairwise(ends)])
         return mesh, values[first]

@@ -560,6 +560,7 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
     s0, between, s1 = a[S0], a[S1], b[S1]
+    # the merged wave has the rays of a at its beginning and of b at its end: its centre is where these meet
     ax, ay = ray(a, s0)
     bx, by = ray(b, s1)
     a_norm, b_norm = np.sqrt(ax * ax + ay * ay), np.sqrt(bx * bx + by * by)
@@ -577,12 +578,12 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
         merged[P], merged[Q], merged[KIND] = x / norm, y / norm, BEAM
         merged[SIGMA] = begin - s0 * x / norm
     else:
-        away = (s1 - s0) * by / turn
-        if 0.0 < away < 4.0 * length:
+        to_centre = (s1 - s0) * by / turn  # along the ray, so that it is negative if the centre is a source
+        if 0.0 < to_centre < 4.0 * length:
             return False
-        merged[P], merged[Q] = s0 + away * ax, away * ay
-        merged[KIND] = POINT if away < 0.0 else FOCUS
-        merged[SIGMA] = begin + away
+        merged[P], merged[Q] = s0 + to_centre * ax, to_centre * ay
+        merged[KIND] = POINT if to_centre < 0.0 else FOCUS
+        merged[SIGMA] = begin + to_centre
     error, end_error = arrival(merged, between, 0.0) - middle, arrival(merged, s1, 0.0) - end
     if max(abs(error), abs(end_error)) > tolerance * length:
         return False

@@ -94,6 +94,7 @@ class PlacedSegments:
         """Place the segments along edges in all faces at the edge; return the fields of the class from `ends` on."""
         nodes, rows = merged.nodes, np.flatnonzero(merged.edges >= 0)
         ends, edges, vectors = merged.ends[rows], merged.edges[rows], merged.vectors[rows]
+        # fractions of the edge at both ends; on a loop, whose ends are one vertex, the length of the segment decides
         along = np.stack([fractions_along_edges(triangles, nodes[ends[:, k]], edges) for k in range(2)], axis=1)
         loops = triangles.edges.vertices[edges, 0] == triangles.edges.vertices[edges, 1]
         vertex = nodes.kinds[ends] == VERTEX
@@ -106,6 +107,7 @@ class PlacedSegments:
         faces, local_sides = halfedges // 3, halfedges % 3
         forward = triangles.edges.forward[faces, local_sides]
         along, ends = along[owners], ends[owners]
+        # each segment runs in the direction of the side, with the face to its left
         swapped = (along[:, 1] < along[:, 0]) == forward
         along[swapped], ends[swapped] = along[swapped, ::-1], ends[swapped, ::-1]
         positions = on_sides(triangles, faces, local_sides, along)

@@ -295,7 +295,8 @@ def unit_vectors(
 ) -> None:
     """Write the vectors of a slab, scaled to length 1, to `out`; where they have underflowed, it keeps its values.
 
-    Those are of a coarser level. `out` is (d, *shape).
+    Those are of a coarser level. `vectors` are (a, b, c, n, 4), known in the stretches of lines where `inside` is true,
+    and `out` is (d, a, b, c, n). The slab has the nodes `start` to `stop` along an axis.
     """
     window = slab(axis, start, stop)
     components = np.moveaxis(vectors[window], -1, 0)

@@ -239,7 +239,9 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
     """Whether a point y in the bounds of a tree's node can be as near to some x of a box as q, nearest to its centre.
 
     ``|x − y|² − |x − q|²`` at the worst x is the sum over axes of ``y² − q² − 2 e |y − q|``, where e is half the width
-    of the box. It is least at ±e, at q or at an end of the bounds.
+    of the box. It is least at ±e, at q or at an end of the bounds. `box`, (9,), has the centre, from which positions
+    are measured, the half widths and q. The faces of the node lie in the disc ``discs[node]``: centre, unit normal,
+    radius and half thickness, which is negative without a disc.
     """
     total, scale = 0.0, 0.0
     for d in range(3):
@@ -264,9 +266,11 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
     along = x * nx + y * ny + z * nz
     x, y, z = x - along * nx, y - along * ny, z - along * nz
     from_axis = np.sqrt(x * x + y * y + z * z)
-    out = max(1.0 - discs[node, 6] / from_axis, 0.0) if from_axis > 0.0 else 0.0
-    up = along - min(max(along, -thick), thick)
-    x, y, z = out * x + up * nx, out * y + up * ny, out * z + up * nz  # from the nearest place of the disc
+    # the vector from the nearest place of the disc to the centre of the box. The squared distance to the disc lies
+    # above its tangent plane there
+    outside = max(1.0 - discs[node, 6] / from_axis, 0.0) if from_axis > 0.0 else 0.0
+    above = along - min(max(along, -thick), thick)
+    x, y, z = outside * x + above * nx, outside * y + above * ny, outside * z + above * nz
     low = x * x + y * y + z * z - scale * (1.0 + SQUARE_ROUNDING)
     for d in range(3):
         away = x if d == 0 else y if d == 1 else z

@@ -216,15 +216,16 @@ def _least_bent(
     size = 0
     for h in range(n_loops):
         size = max(size, starts[h + 1] - starts[h])
+    # `across[i, j]` is the normal of that lid's triangle at the diagonal, and `split[i, j]` its third corner
     cost, rims, across = np.empty((size, size)), np.empty((size, size)), np.empty((size, size, 3))
     split, stack, normal = np.empty((size, size), dtype=np.int64), np.empty((size, 2), dtype=np.int64), np.empty(3)
     count = 0
     for h in range(n_loops):
         begin, n = starts[h], starts[h + 1] - starts[h]
         points = corners[begin : begin + n]
-        around = 0.0
+        perimeter = 0.0
         for i in range(n):
-            around += _length(points[i], points[(i + 1) % n])
+            perimeter += _length(points[i], points[(i + 1) % n])
             if i < n - 1:
                 cost[i, i + 1] = rims[i, i + 1] = 0.0
                 across[i, i + 1] = normals[begin + i]
@@ -254,7 +255,7 @@ def _least_bent(
                             rims[i, j] += length_behind * behind**2
         last = _length(points[n - 1], points[0])
         bend = rims[0, n - 1] + last * _angle(across[0, n - 1], normals[begin + n - 1]) ** 2
-        closed[h] = cost[0, n - 1] < np.inf and bend <= most**2 * around
+        closed[h] = cost[0, n - 1] < np.inf and bend <= most**2 * perimeter
         stack[0, 0], stack[0, 1], depth = 0, n - 1, 1
         while depth > 0:
             depth -= 1

@@ -54,13 +54,15 @@ class Regions:
         near a few faces of each component. The (m,) `slacks` are distances within which points on the faces coincided
         when these were cut; winding numbers are computed farther than that from a face.
         """
+        # copies of a triangle form a group: the first of them stands for all, counted with signs
         first, reverse = coincident_faces(pieces.faces.ravel(), np.arange(0, pieces.faces.size + 1, 3))
         first = np.where(first < 0, np.arange(len(first)), first)  # triangles on fewer than three points
         distinct, groups = np.unique(first, return_inverse=True)
         times = np.bincount(groups, np.where(reverse, -1, 1), len(distinct)).astype(np.int64)
         vectors = area_vectors(pieces.points.take(pieces.faces, axis=0))
-        parents = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
-        normals = parents[pieces.origins[distinct]]
+        # parts of one face have its normal, which is more accurate than those of slivers
+        parent_normals = unit(sums_of(vectors, pieces.origins, int(pieces.origins.max(initial=-1)) + 1))
+        normals = parent_normals[pieces.origins[distinct]]
         steps = PROBE_DISTANCE * slacks[pieces.origins[distinct]]
         numbers, contradictions = _windings(pieces.points, pieces.faces[distinct], normals, times, windings, steps)
         behind, ahead = (numbers > INSIDE_WINDING).T
@@ -149,17 +151,18 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     lengths, along = np.linalg.norm(along, axis=1), unit(along)
     across = np.cross(normals[owners], ways[:, None] * along[around])
     angles = angles_around(along[around], across)
+    # each face around the edge encloses the space up to the next one with its side towards it
     order = np.lexsort((angles, around))
     onward = next_in_groups(np.append(0, np.cumsum(table.face_counts[edges])))
     last, following = onward <= np.arange(len(order)), order[onward]
     heights = face_areas(points[faces[owners]]) / np.maximum(lengths[around], 1e-300)
-    apart = angles[following] - angles[order] + np.where(last, 2 * np.pi, 0.0)
-    apart *= np.minimum(lengths[around[order]], np.minimum(heights[order], heights[following]))
+    gaps = angles[following] - angles[order] + np.where(last, 2 * np.pi, 0.0)
+    gaps *= np.minimum(lengths[around[order]], np.minimum(heights[order], heights[following]))  # wide ones are certain
     balanced = np.bincount(around, ways * times[owners], len(edges)) == 0
-    clear = np.flatnonzero(balanced[around[order]] & (apart > 0))
-    clear = clear[np.argsort(-apart[clear], kind="stable")]
-    beside = _facing(table, crowded[order[clear]], crowded[following[clear]])
-    return np.concatenate([sides, beside[0]]), np.concatenate([facing_sides, beside[1]])
+    clear = np.flatnonzero(balanced[around[order]] & (gaps > 0))
+    clear = clear[np.argsort(-gaps[clear], kind="stable")]
+    crowded_sides = _facing(table, crowded[order[clear]], crowded[following[clear]])
+    return np.concatenate([sides, crowded_sides[0]]), np.concatenate([facing_sides, crowded_sides[1]])
 
 
 def _directions(table: EdgeTable, halfedges: Ints) -> Ints:

@@ -123,13 +123,14 @@ def sealed(mesh: TriangleMesh, length: float) -> tuple[TriangleMesh, Ints, LeftO
     shallow[owners[~flood.shallow(centres)]] = False
     for side, way in enumerate((1.0, -1.0)):
         outside[owners[flood.touches(centres, way * normals[owners])], side] = True
+    # side 2 f of piece f is in front of it, 2 f + 1 behind; across an edge of two faces, each side goes on
     table = edge_table(pieces.faces)
     pairs = table.pairs  # halfedges of edges with two faces
-    same = table.forward.ravel()[pairs[:, 0]] == table.forward.ravel()[pairs[:, 1]]
+    disagree = table.forward.ravel()[pairs[:, 0]] == table.forward.ravel()[pairs[:, 1]]
     first, second = pairs.T // 3
     both_shallow = shallow[first] & shallow[second]
     sides = np.concatenate([2 * first, 2 * first + 1])
-    next_sides = np.concatenate([2 * second + same, 2 * second + 1 - same])
+    next_sides = np.concatenate([2 * second + disagree, 2 * second + 1 - disagree])
     shallow_pairs = np.concatenate([both_shallow, both_shallow])
     # where one of the two is touched, the other one need only be shallow itself
     labels = connected_components(2 * n, sides[shallow_pairs], next_sides[shallow_pairs])

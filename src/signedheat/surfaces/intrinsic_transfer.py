@@ -111,8 +111,9 @@ def barycentric_of(triangles: IntrinsicMesh, faces: Ints, points: Complexes) -> 
 
 def differences_of(triangles: IntrinsicMesh, faces: Ints, vectors: Complexes) -> Floats:
     """(n, k, 3) differences of barycentric coordinates that stand for (n, k) vectors in the layouts of (n,) faces."""
-    q = triangles.corner_positions[faces]
-    u, v = (q[:, 1] - q[:, 0])[:, None], (q[:, 2] - q[:, 0])[:, None]
+    corners = triangles.corner_positions[faces]
+    # the vector is second · u + third · v
+    u, v = (corners[:, 1] - corners[:, 0])[:, None], (corners[:, 2] - corners[:, 0])[:, None]
     area = (np.conj(u) * v).imag
     flat = np.flatnonzero(area[:, 0] <= LEAST_AREA * (np.abs(u) ** 2 + np.abs(v) ** 2)[:, 0])
     area[flat] = 1.0

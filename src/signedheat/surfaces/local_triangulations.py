@@ -236,6 +236,8 @@ def _unfolded(points: Floats, normals: Floats, axes: Floats, outward: Floats, fl
     (n, 2, 3), a unit vector `outward` in that plane, away from neighbours on the same side, (n, 3), and in `flat`,
     (n,), the height above the plane up to which points count as lying in it.
     """
+    # `middle` is the mean normal, and `seen` the vector from p to q without its height along this, which is then
+    # rotated from the plane across the mean normal into that of p
     result, middle, seen = np.empty((len(pairs), 2)), np.empty(3), np.empty(3)
     for row in range(len(pairs)):
         p, q = pairs[row]

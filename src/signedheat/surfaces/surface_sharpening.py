@@ -358,17 +358,20 @@ def nearest_sides(triangles: IntrinsicMesh, placed: PlacedSegments, ends: Ints) 
     height = (np.conj(step) * corner).imag / np.abs(step)
     height[np.abs(height) <= EQUALLY_NEAR * np.abs(step)] = 0.0
     is_end = mask_of(len(placed.nodes), ends)
-    bare = ((share == 0) & is_end[placed.ends[rows, 0], None]) | ((share == 1) & is_end[placed.ends[rows, 1], None])
+    # (k, 3) corners of the faces that are nearest to a free end, beyond which there are no sides
+    nearest_to_end = (share == 0) & is_end[placed.ends[rows, 0], None]
+    nearest_to_end |= (share == 1) & is_end[placed.ends[rows, 1], None]
     vertex = triangles.corner_vertices[faces]
     reach = np.full(n, np.inf)
     np.minimum.at(reach, vertex, gap)
     nearest = gap <= reach[vertex] * (1 + EQUALLY_NEAR)
-    sine = np.abs(height) / np.maximum(gap, 1e-300)
-    front = np.zeros(n)
-    np.maximum.at(front, vertex[nearest], sine[nearest])
-    chosen = nearest & (sine >= front[vertex] - EQUALLY_NEAR)
-    shown = np.where(bare, 0, np.sign(height) * sides[:, None])
-    left, right, bare_end = (
-        np.bincount(vertex[chosen & test], minlength=n) > 0 for test in (shown > 0, shown < 0, bare)
+    sine = np.abs(height) / np.maximum(gap, 1e-300)  # 1 in front of the segment, less beyond its ends
+    largest_sine = np.zeros(n)
+    np.maximum.at(largest_sine, vertex[nearest], sine[nearest])
+    chosen = nearest & (sine >= largest_sine[vertex] - EQUALLY_NEAR)
+    side_of_corner = np.where(nearest_to_end, 0, np.sign(height) * sides[:, None])
+    positive, negative, at_end = (
+        np.bincount(vertex[chosen & test], minlength=n) > 0
+        for test in (side_of_corner > 0, side_of_corner < 0, nearest_to_end)
     )
-    return np.where(bare_end, 0, left.astype(np.int64) - right), reach
+    return np.where(at_end, 0, positive.astype(np.int64) - negative), reach

@@ -238,18 +238,18 @@ def _any_angle(
 def _sees(planes: Planes, vertices: Vertices, v: int, target: Floats, slack: float) -> bool:
     """Whether the segment from vertex v to a (3,) target in the mesh lies in the mesh, up to `slack`."""
     x, y, z = vertices.points[v]
-    u, w, t = target
+    target_x, target_y, target_z = target
     tet, least = -1, np.inf
     for i in range(vertices.first_tet[v], vertices.first_tet[v + 1]):  # the tet that the segment starts into
         worst = -np.inf
         for k in range(4):
             if vertices.tets[vertices.tets_at[i], k] != v:
-                worst = max(worst, beyond(planes, vertices.tets_at[i], k, u, w, t))
+                worst = max(worst, beyond(planes, vertices.tets_at[i], k, target_x, target_y, target_z))
         if worst < least:
             tet, least = vertices.tets_at[i], worst
     if least > slack:
         return False
-    return stays_inside(planes, vertices.neighbors, tet, x, y, z, u, w, t, slack)
+    return stays_inside(planes, vertices.neighbors, tet, x, y, z, target_x, target_y, target_z, slack)
 
 
 @compiled
