@@ -490,22 +490,24 @@ def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
 def _meetings(
     points: Floats, faces: Ints, edges: Ints, face_edges: Ints, pairs: Ints, slacks: Floats
 ) -> tuple[Ints, Floats, Floats]:
-    """Find the points in which pairs of faces, (k, 2), meet.
+    """Find the points in which pairs of faces, (k, 2), meet; `edges`, (e, 2), are all, `face_edges`, (m, 3), of faces.
 
     Returns (e, 3) meetings, (e, 3) their positions, which are zero where the point is a vertex, and (e,) their slacks.
     A meeting is a row of its kind and the ids of two elements: ON_EDGE, edge and vertex; IN_FACE, face and vertex;
     TWO_EDGES and both edges, the smaller id first; EDGE_AND_FACE, edge and face.
     """
     meetings, positions, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]
-    touch = np.empty((2, 3, 3), np.bool_)  # whether a corner of one lies on an edge of the other
-    on, hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3), np.bool_), np.empty((2, 3))
+    # of both faces of a pair: whether corner i lies on edge k of the other face, or anywhere on that face; whether edge
+    # k meets the boundary of the other face; and the heights of corners above it
+    touch, on = np.empty((2, 3, 3), np.bool_), np.empty((2, 3), np.bool_)
+    hit, heights = np.empty((2, 3), np.bool_), np.empty((2, 3))
     normals, position = np.empty((2, 3)), np.empty(3)
     for r in range(len(pairs)):
         slack = min(slacks[pairs[r, 0]], slacks[pairs[r, 1]])
         touch[:], on[:], hit[:], heights[:] = False, False, False, 0.0
         for s in range(2):
             normals[s, 0], normals[s, 1], normals[s, 2] = _normal(points, faces[pairs[r, s]])
-        for s in range(2):
+        for s in range(2):  # corners of one face on the other
             corners, g = faces[pairs[r, s]], pairs[r, 1 - s]
             for i in range(3):
                 v = corners[i]
@@ -526,7 +528,7 @@ def _meetings(
                     positions.append((0.0, 0.0, 0.0))
                     on[s, i] = True
         f, g = pairs[r, 0], pairs[r, 1]
-        for i in range(3):
+        for i in range(3):  # edges that cross
             e = face_edges[f, i]
             a, b = edges[e, 0], edges[e, 1]
             for k in range(3):
@@ -541,7 +543,7 @@ def _meetings(
                     meetings.append((TWO_EDGES, min(e, h), max(e, h)))
                     positions.append((position[0], position[1], position[2]))
                     hit[0, i], hit[1, k] = True, True
-        for s in range(2):
+        for s in range(2):  # edges of one face that pierce the other
             g = pairs[r, 1 - s]
             for i in range(3):
                 k = (i + 1) % 3

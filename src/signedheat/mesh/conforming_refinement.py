@@ -173,7 +173,7 @@ class FaceCutter:
 
     def cut_face(self, face: int, inside: list[int]) -> None:
         """Cut a face along the segments inside it, whose numbers are given."""
-        around = ((self.begin[face] + np.arange(3)) % 3).tolist()
+        around = ((self.begin[face] + np.arange(3)) % 3).tolist()  # its corners; points are (u, v) in the last two
         outline = self.outline(face, around)
         points, vertices = outline.points, outline.vertices
         for i in self.in_face[face]:

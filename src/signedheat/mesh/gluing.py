@@ -121,7 +121,9 @@ def record(g: Gluing, kind: int, first: int, second: int, vertex: int, a: float,
 def faces_around(steps: Ints, n: int, around: Ints, start: Ints) -> None:
     """Write the up to three faces that step n changes or makes to `around`, −1 in place of missing ones.
 
-    Also write the corner of each face at which the points of the step begin to `start`.
+    Also write the corner of each face at which the points of the step begin to `start`. `steps` are those of `Gluing`.
+    The first face is given by a halfedge if the step flips or splits an edge, and the second if it flips one. A face
+    that is split gives two new ones in succession.
     """
     kind = steps[n, 0]
     around[0], around[1], around[2] = steps[n, 1], steps[n, 2], steps[n, 2] + 1

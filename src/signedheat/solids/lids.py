@@ -321,12 +321,13 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
         weights = np.maximum(areas, 1e-3 * np.median(areas[n:]))
         weights[:n] += springs
         weights = 1.0 / weights
-        given = matrix[:, :n] @ rim - (areas * rest)[:, None] * up
-        given[:n] += load
+        # weighted least squares for the inner vertices x: the residual is inner · x + known
+        known = matrix[:, :n] @ rim - (areas * rest)[:, None] * up
+        known[:n] += load
         inner = matrix[:, n:]
-        normal = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
+        normal_matrix = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
         vertices = lid.vertices.copy()
-        vertices[n:] = sparse.linalg.splu(normal).solve(-(inner.T @ (weights[:, None] * given)))
+        vertices[n:] = sparse.linalg.splu(normal_matrix).solve(-(inner.T @ (weights[:, None] * known)))
         rises = ((vertices - lid.vertices) * up).sum(axis=1)  # moves along the surface do not change its shape
         moves.append(float(np.abs(rises).max()))
         if moves[-1] > moves[-2]:  # the moves oscillate

@@ -134,20 +134,23 @@ def transfer_segments(
     They are cut where they cross edges of the latter.
     """
     after = history.after
-    none = np.zeros((len(source.nodes), 0, 3))
-    spots = history.forward(*_snapped(*refinement.push_forward(source.nodes.faces, source.nodes.barycentric, none)))
-    nodes = locate_points(after, spots[0], spots[1])
+    no_vectors = np.zeros((len(source.nodes), 0, 3))
+    at_nodes = _snapped(*refinement.push_forward(source.nodes.faces, source.nodes.barycentric, no_vectors))
+    node_faces, node_weights, _ = history.forward(*at_nodes)
+    nodes = locate_points(after, node_faces, node_weights)
     if len(source.ends) == 0:
         return CurveSegments(nodes, source.ends, source.faces, source.edges, source.vectors, source.oriented)
 
+    # the midpoint of each segment is transferred, with the vectors of the segment and of its normal, and the segment is
+    # traced from there
     faces, at_start, at_end, directions = in_faces(before, source)
     along = at_end - at_start
-    growth = differences_of(before, faces, directions[:, None])[:, 0]
-    at_piece = (along * before.corner_positions[faces]).sum(axis=1)
-    vectors = np.stack([along, growth], axis=1)
-    middle = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
-    lines = straight_lines(history.gluing_after, *middle)
-    lost = misplaced_lines(after, lines, np.abs(at_piece))
+    normals = differences_of(before, faces, directions[:, None])[:, 0]
+    in_layout = (along * before.corner_positions[faces]).sum(axis=1)
+    vectors = np.stack([along, normals], axis=1)
+    midpoints = history.forward(*_snapped(*refinement.push_forward(faces, 0.5 * (at_start + at_end), vectors)))
+    lines = straight_lines(history.gluing_after, *midpoints)
+    lost = misplaced_lines(after, lines, np.abs(in_layout))
     if len(lost):
         raise SourceError(
             f"segment {lost[0]} of the curves crosses triangles as thin as rounding, which flip it",
@@ -167,8 +170,8 @@ def transfer_segments(
     corners = after.corner_positions[faces]
     steps = ((ends.barycentric - starts.barycentric) * corners).sum(axis=1)
     carried = np.conj(steps) * (carried[:, 1] * corners).sum(axis=1)
-    turn = (directions / (at_piece * np.abs(directions / at_piece)))[owners]
-    grown = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
+    turn = (directions / (in_layout * np.abs(directions / in_layout)))[owners]
+    segment_normals = steps * np.where(carried.imag * turn.imag < 0, np.conj(turn), turn)
     begin, finish = (barycentric_in(after, faces, located[end]) for end in joined.T)
     edges, side = edges_between(after, faces, begin, finish)
     used = np.union1d(np.arange(len(nodes)), joined)
@@ -179,7 +182,7 @@ def transfer_segments(
         point_ids[place],
         faces,
         edges,
-        np.where(edges >= 0, after.in_edge_frames(grown, faces, side), grown),
+        np.where(edges >= 0, after.in_edge_frames(segment_normals, faces, side), segment_normals),
         source.oriented,
     )
 

@@ -243,6 +243,7 @@ class SurfaceIntegration(SpringIntegration):
         assert isinstance(source, SurfaceSource)
         n, springs = len(source.weights), self.springs(source)
         ends, lengths = ends_among(source.parts, np.arange(n)), np.concatenate([p.lengths for p in source.parts])
+        # of both Gauss points of each segment: the samples at its ends, and the weights of these
         shares = 0.5 + np.array([[1.0, -1.0], [-1.0, 1.0]]) / 12**0.5
         along = np.repeat(ends, 2, axis=0), np.tile(shares, (len(ends), 1))
         alone = np.bincount(ends.ravel(), minlength=n) == 0
