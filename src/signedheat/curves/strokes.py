@@ -288,7 +288,10 @@ class Strokes:
     def of(
         cls, surface: SurfaceDiscretization, parts: Sequence[CurveSegments], edge: float, group: Ints, is_loop: Bools
     ) -> Strokes:
-        """Find the vertices on both sides of each stroke; `edge` is the mean length of an edge of the mesh."""
+        """Find the vertices on both sides of each stroke; `edge` is the mean length of an edge of the mesh.
+
+        `group` and `is_loop` are as in the result.
+        """
         triangles = surface.triangles
         lengths = np.array([part.lengths.sum() for part in parts])
         seen = sides_seen(triangles, parts)

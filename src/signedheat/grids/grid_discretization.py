@@ -217,7 +217,7 @@ other."""
 
 @dataclass(frozen=True, eq=False)
 class GridIntegration(SolvesEach):
-    """Step 3 on a grid: φ from the right-hand side b, in the shape of the grid."""
+    """Step 3 on a grid: φ from the right-hand side b, the `divergence`; both have the shape of the grid."""
 
     grid: Grid
 

@@ -414,8 +414,11 @@ def _sweep_tiles(
 ) -> None:
     """Solve for the vectors on the lines of tiles, one line after the other, given those on neighbouring lines.
 
-    Arrays are those of `diffuse_by_sweeps`, with one row for each line. Four components are updated at once; slices of
-    lines help the compiler to vectorise.
+    Lines run along the last of the four axes, with n nodes in stretches of `STRETCH`. `vectors`, (lines, 4 n), are X,
+    which is solved for in stretches that are `active`, (lines, stretches). `places`, (lines, stretches), are the row of
+    the source vectors of each stretch in `sums`, (r, 4 · `STRETCH`), or −1. `ratios` are a along the four axes,
+    `pivots` those of `line_pivots`, and rows of `tiles`, (t, 9), start, stop and step along the first three axes. Four
+    components are updated at once; slices of lines help the compiler to vectorise.
     """
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios

@@ -39,7 +39,10 @@ class NodeSources(NamedTuple):
     def scattered(
         cls, shape: tuple[int, ...], steps: Floats, nodes: Ints, weights: Floats, values: NDArray[np.floating]
     ) -> NodeSources:
-        """Add (s, c) values, c ≤ 4, to the (s, k) `nodes` of a grid, numbered in C order, with (s, k) `weights`."""
+        """Add (s, c) values, c ≤ 4, to the (s, k) `nodes` of a grid, numbered in C order, with (s, k) `weights`.
+
+        `shape` and `steps` are those of the result.
+        """
         used = weights > 0
         lines, offsets = np.divmod(nodes[used], shape[3])
         empty = cls.empty(shape, steps)
@@ -114,7 +117,8 @@ def _merge(
     """Do the work of `merge_in_cells`, simplex by simplex in `order`, by component.
 
     Return (s, 2 d + 1) sums of weight · position, vector and weight by component and cell, their (s,) components, and
-    `sums` of the sources. `slots` are zeros, one for each cell.
+    `sums` of the sources. `slots` are zeros, one for each cell; they become 1 + the sample of a cell. Each simplex is
+    bisected at its longest edge until no edge is longer than `size`; each part is added at its centre.
     """
     nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
@@ -153,7 +157,7 @@ def _merge(
                     missed = True
             if missed:
                 continue
-            longest = -1.0
+            longest = -1.0  # squared length of the longest edge, from corner tail to head
             tail, head = 0, 0
             for c in range(n_corners):
                 for e in range(c):

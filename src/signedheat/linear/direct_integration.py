@@ -33,7 +33,10 @@ LEAST_STIFFNESS = 10.0
 
 @dataclass(frozen=True, eq=False)
 class DirectIntegration(Frozen):
-    """Solver of ``C φ = b`` with n unknowns, with the constraints of Sec. 7.1; derived classes define `fit`."""
+    """Solver of ``C φ = b`` with n unknowns, with the constraints of Sec. 7.1; derived classes define `fit`.
+
+    Methods take b, (n,), as `divergence`, and return φ, (n,).
+    """
 
     stiffness: sparse.csr_matrix  # (n, n) upper triangle of C, whose kernel are the constants on each component
     factorize: Callable[..., Factor] = factorize  # takes an upper triangle, and a `PardisoFactor` as `like`

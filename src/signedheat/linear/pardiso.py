@@ -168,7 +168,10 @@ class _Call:
                 self._lock.release()
 
     def _run(self, phase: int, rhs: NDArray[Any] | None = None, solution: NDArray[Any] | None = None) -> None:
-        """Call PARDISO for a phase of its manual, such as 33 to solve; raise `FactorizationError` if it fails."""
+        """Call PARDISO for a phase of its manual, such as 33 to solve; raise `FactorizationError` if it fails.
+
+        The `solution` for right-hand sides `rhs`, (n,) or (n, k), is written.
+        """
         integer, values = self._integer, self.values  # which are others once nobody waits for this call
         status = integer(0)
         n_columns = integer(1 if rhs is None or rhs.ndim == 1 else rhs.shape[1])

@@ -94,7 +94,10 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
 
 
 class FaceCutter:
-    """An intrinsic mesh while some of its faces are cut along segments."""
+    """An intrinsic mesh while some of its `faces`, ids, are cut along segments, and the ids `edges` divided at nodes.
+
+    The triangulation of a face begins at its corner ``begin[face]``.
+    """
 
     def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: Ints, edges: Ints, begin: Ints) -> None:
         self.triangles, self.merged, self.begin = triangles, merged, begin

@@ -104,8 +104,10 @@ def winding_sums(triangles: Floats, points: Floats) -> Floats:
 def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats, thickness: float) -> Floats:
     """Return (n,) winding numbers, from the solid angles of faces in near leaves and the moments of far nodes.
 
-    `corners` are (m, 9), `items` those of the tree, and `moments` the result of the function `_moments`. Points in a
-    face, up to a height of `thickness` relative to its size, see as much of it on one side as on the other: nothing.
+    `corners` are (m, 9), `items` the faces in the leaves of the tree, and `moments`, (2 · leaves, 23), those of its
+    nodes: area vector, centre, squared distance beyond which they are used, and coefficients of M (6) and S (10).
+    Points in a face, up to a height of `thickness` relative to its size, see as much of it on one side as on the other:
+    nothing.
     """
     leaves = len(moments) // 2
     stack = np.empty(64, dtype=np.int64)

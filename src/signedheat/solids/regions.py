@@ -109,8 +109,9 @@ def _windings(
 ) -> tuple[Floats, int]:
     """Return (m, 2) winding numbers behind and in front of each distinct face, and how many pairs of sides contradict.
 
-    `times` says how often each face is there, opposite copies counted as −1. Sides of wide faces are probed
-    at least their (m,) steps away.
+    `normals`, (m, 3), are unit vectors, and `times`, (m,), says how often each face is there, opposite copies counted
+    as −1. Across edges, numbers follow from each other, up to a constant for each connected part, which is sampled on
+    its widest faces. Sides of wide faces are probed at least their (m,) steps away.
     """
     n = len(faces)
     sides, facing_sides = _around_edges(points, faces, normals, times)

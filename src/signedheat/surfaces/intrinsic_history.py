@@ -304,10 +304,11 @@ def squared_length(g: Gluing, f: int, v: Floats) -> tuple[float, float]:
 def trace_geodesic(g: Gluing, face: int, barycentric: Floats, vectors: Floats, sign: float, out: Lines, n: int) -> int:
     """Trace a geodesic from a point along its first vector, times ±1, over its length; carry the other vectors.
 
-    Write a row for each face crossed, from row n on, as far as there is room; return the next row. A line ends early
-    where rounding in nearly flat faces has made it longer.
+    The point has (3,) barycentric coordinates in a face, and (k, 3) vectors are differences of such. Write a row to
+    `out` for each face crossed, from row n on, as far as there is room; return the next row. A line ends early where
+    rounding in nearly flat faces has made it longer.
     """
-    f, left, slides = face, 1.0, 0
+    f, left, slides = face, 1.0, 0  # the share still to go, and how often it turned along the boundary since it moved
     w, v = barycentric.copy(), vectors.copy()
     square, rounding = squared_length(g, f, v[0])
     longest = 4.0 * (abs(square) + SQUARE_LENGTH_ROUNDING * rounding)
