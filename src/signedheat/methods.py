@@ -319,7 +319,7 @@ class Convex(Method):
             )
         integration = discretization.integration
         assert isinstance(integration, DirectIntegration)  # as on surfaces and tets, which have linear elements
-        # ADMM for φ and z = ∇φ: minimise −Σ A_i sign(φ⁰_i) φ_i / reach, while z has lengths of at most 1
+        # ADMM for φ and z = ∇φ: minimise −Σ A_i sign(φ⁰_i) φ_i / reach, where z has lengths of at most 1
         sizes, total = elements.sizes, elements.sizes.sum()
         with one_blas_thread():  # threads cost a triangular solve of this size more than they gain
             factor = integration.anchored(source)

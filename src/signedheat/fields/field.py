@@ -870,6 +870,7 @@ def combined(
     """
 
     def rule(first: Floats, second: Floats) -> Floats:
+        """Combine values of both fields at the same places, in arrays of any one shape."""
         values = np.where(takes_first(first, second), first, second)
         if bulge:
             overlap = np.maximum(abs(bulge) - np.abs(first - second), 0.0)

@@ -51,9 +51,10 @@ def _(discretization: GridDiscretization, values: Floats, source: GridSource, di
 def _(
     discretization: SurfaceDiscretization, values: Floats, source: SurfaceSource, diagnostics: Diagnostics
 ) -> Field[SurfaceDomain]:
+    """Make a field on the surface, and one on its finer triangulation if it was retriangulated for the source."""
     # NaN where diffusion did not reach, such as behind a single shared vertex
     values = np.where(discretization.reached_by(source.vectors), values, np.nan)
-    triangulation, everywhere = discretization.triangulation, values
+    triangulation, all_values = discretization.triangulation, values
     values = values[discretization.restriction]
     if isinstance(discretization.domain, PointCloud) and np.isnan(values).any():  # its triangles may have gaps
         cloud = discretization.domain
@@ -65,7 +66,7 @@ def _(
     noted = replace(diagnostics, unreached=unreached).noting(*notes)
     finer = None
     if triangulation is not None:
-        added = everywhere[len(values) : triangulation.n_vertices]
+        added = all_values[len(values) : triangulation.n_vertices]
         finer = Field(triangulation, np.concatenate([values, added]), noted, source=source)
     return Field(discretization.domain, values, noted, source=source, finer=finer)
 

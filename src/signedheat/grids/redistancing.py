@@ -381,7 +381,7 @@ def _circle_distances(
 ) -> Floats:
     """(r,) distances of (r, 4) `nodes` to the circles that touch the zero set at the (r,) `crossings`.
 
-    Crossings lie at (c, 4) `points` and have (c, 4) unit `normals` and (c, 4, 4) `bends`, the second fundamental forms.
+    Crossings lie at (c, 4) `points` and have (c, 4) unit `normals` and (c, 4, 4) `bends`, symmetric shape operators.
     No circle is nearer than its crossing by more than `reach`.
     """
     distances, away, across = np.empty(len(nodes)), np.empty(4), np.empty(4)

@@ -86,6 +86,7 @@ def _near(tree: OrientedBoxes, triangles: Triangles, around: bool) -> Ints:
     tasks = 1 << max((count // ROWS_PER_TASK).bit_length() - 1, 0)
 
     def of_task(task: int) -> Ints:
+        """(k, 2) pairs found from one node of the tree, in an array that is enlarged until there is room for all."""
         room = ROWS_PER_TASK
         while True:
             pairs = np.empty((room, 2), dtype=np.int64)

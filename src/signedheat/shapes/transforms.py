@@ -106,6 +106,7 @@ def _(shape: DigitalSurface, linear: Floats, move: Floats) -> PolygonMesh:
 
 @transformed.register
 def _(shape: PointCloud, linear: Floats, move: Floats) -> PointCloud:
+    """Transform points, and the disks around them that their normals and areas describe."""
     if shape.points.shape[1] != 3:
         raise GeometryError(
             f"a cloud of points with {shape.points.shape[1]} coordinates cannot be transformed by a matrix for 3",
