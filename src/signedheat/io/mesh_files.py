@@ -216,7 +216,9 @@ def _elements(words: list[list[Any]]) -> tuple[Ints, Ints]:
     counts = np.array([len(element) - 1 for element in words], dtype=np.int64)
     flat = [word for element in words for word in element[1:]]
     if any("/" in word for word in flat):
-        wrong = next((word for word in flat if not CORNER.fullmatch(word)), None)
+        # most files need no pattern, which would take a quarter of the time to read them
+        is_plain = not "".join(flat).encode().translate(None, b"0123456789/") and max(w.count("/") for w in flat) < 3
+        wrong = None if is_plain else next((word for word in flat if not CORNER.fullmatch(word)), None)
         if wrong is not None:
             raise damaged(
                 f"{quoted(wrong)} is no corner, such as 1, 1/2, 1//3 or 1/2/3", element=f"corner {quoted(wrong)}"

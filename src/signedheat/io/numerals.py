@@ -21,6 +21,8 @@ from .files import damaged
 
 QUOTED = re.compile(rb'"[^"\n]*"')
 """Matches a name in quotes."""
+BEFORE_UNDERSCORE = tuple(b"%c" % character for character in b"0123456789.")
+"""Characters before the underscore of words that `WITH_UNDERSCORE` matches."""
 WITH_UNDERSCORE = re.compile(rb"(?<!\S)[-+.]*[0-9][0-9.]*_")
 """Matches the beginning of a word like a number with an underscore."""
 OF_OTHER_SCRIPT = re.compile(r"(?<!\S)[-+.0-9]*(?![0-9])\d")
@@ -68,9 +70,11 @@ def refuse_odd_text(content: bytes, name: str) -> None:
 
     This is for texts that other packages parse. Names within quotes may hold them.
     """
-    unquoted = QUOTED.sub(b"", content) if b'"' in content else content
-    decoded = "" if unquoted.isascii() else unquoted.decode("utf-8", errors="replace")
-    odd = WITH_UNDERSCORE.search(unquoted) or OF_OTHER_SCRIPT.search(decoded)
+    has_underscore = any(part.endswith(BEFORE_UNDERSCORE) for part in content.split(b"_")[:-1])
+    if content.isascii() and not has_underscore:
+        return
+    unquoted = QUOTED.sub(b"", content)
+    odd = WITH_UNDERSCORE.search(unquoted) or OF_OTHER_SCRIPT.search(unquoted.decode("utf-8", errors="replace"))
     if odd is not None:
         raise damaged(f"{name} are not all numbers: one begins with {_shown(odd[0])}")
 

@@ -45,6 +45,8 @@ TET_FORMATS = frozenset(MESHIO_MODULES)
 TET_FIELD_FORMATS = frozenset({".msh", ".vtk", ".vtu"})
 COUNTED = {"PhysicalNames": 1, "Entities": 4, "Nodes": 2, "Elements": 2, "Periodic": 1, "NodeData": 1, "ElementData": 1}
 """Number of counts at the beginning of each section of a Gmsh file, by its name (one in version 2)."""
+VTK_COUNTED = {"POINTS": 1, "CELLS": 2, "CELL_TYPES": 1, "POINT_DATA": 1, "CELL_DATA": 1}
+"""Number of counts after the name of each section of a file of VTK's older format."""
 LONGEST_LINE = 200
 """Bytes of a line in which counts are looked for."""
 IN_TEXT = ("PhysicalNames", "NodeData", "ElementData")
@@ -141,10 +143,10 @@ def _gmsh_counts(data: bytes, kind: np.dtype[Any] | None) -> Iterator[tuple[str,
 
 def _vtk_counts(data: bytes) -> Iterator[tuple[str, list[int]]]:
     """Yield the name of each section of a file of VTK's older format with the counts after it."""
-    for section in re.finditer(rb"^(POINTS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA)[ \t]([^\r\n]*)", data, re.MULTILINE):
-        name = section[1].decode()
-        words = section[2][:LONGEST_LINE].split()[: 2 if name == "CELLS" else 1]
-        yield name, integers(words, f"counts of {name}", 0).tolist()
+    for name, n_counts in VTK_COUNTED.items():
+        for section in data.split(f"\n{name} ".encode())[1:]:
+            words = section[:LONGEST_LINE].split(b"\n")[0].split()[:n_counts]
+            yield name, integers(words, f"counts of {name}", 0).tolist()
 
 
 def _tetgen_counts(data: bytes) -> Iterator[tuple[str, list[int]]]:
