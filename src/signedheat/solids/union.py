@@ -54,21 +54,28 @@ class TriangleGroup:
 
 
 def solid_as_given(mesh: TriangleMesh) -> Solid | None:
-    """Return the solid of a mesh that is one closed surface, faces outwards and does not cross itself, or else None."""
+    """Return the solid of a mesh of closed surfaces if all face outwards, and none crosses or contains another.
+
+    Otherwise return None.
+    """
     points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
     table = edge_table(faces)
     is_closed = (table.face_counts == 2).all() and not table.balance.any()
-    if not is_closed or not has_three_corners(faces).all() or element_components(faces).any():
+    if not is_closed or not has_three_corners(faces).all():
         return None
-    triangles = points.take(faces, axis=0)
-    corners = triangles - triangles[0, 0]  # so that no digits cancel far away
+    triangles, surfaces = points.take(faces, axis=0), element_components(table.face_edges)
+    firsts = first_members(surfaces, int(surfaces.max()) + 1)
+    corners = triangles - triangles[firsts, :1][surfaces]  # so that no digits cancel far away
     vectors = area_vectors(corners)
-    if not vectors.any(axis=1).all() or np.einsum("ij,ij->", corners[:, 0], vectors) <= 0:
+    volumes = np.bincount(surfaces, np.einsum("ij,ij->i", corners[:, 0], vectors))
+    if (volumes <= 0).any() or not vectors.any(axis=1).all():
         return None
     if len(overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT))):
         return None
-    all_bounding, full_confidence = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
     windings = Windings(triangles, open_edges=points[table.vertices[table.balance != 0]])
+    if len(firsts) > 1 and windings.sides(triangles[firsts])[1].any():
+        return None
+    all_bounding, full_confidence = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
     return Solid(triangles, np.arange(len(faces)), full_confidence, all_bounding, windings, mesh, uncrossed=True)
 
 
