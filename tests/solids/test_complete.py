@@ -703,13 +703,22 @@ CLEAN = {
     "box": sh.TriangleMesh(*box(n=1)),
     "squares": as_polygons(sh.TriangleMesh(*box(n=1))),
     "ring": samples.torus(1.0, 0.4, 24, 12),
+    "two": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 5, BALL.faces)),
+    "far apart": samples.union(BALL, sh.TriangleMesh(1e-3 * BALL.vertices + 1e6, BALL.faces)),
+    "one in the hole of the other": samples.union(
+        samples.torus(1.0, 0.4, 24, 12), sh.TriangleMesh(0.5 * BALL.vertices, BALL.faces)
+    ),
     "unused vertices": sh.TriangleMesh(np.concatenate([BALL.vertices, [[9, 9, 9]]]), BALL.faces),
 }
 OTHERS = {
     "inwards": sh.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1]),
     "open": sh.TriangleMesh(BALL.vertices, BALL.faces[1:]),
     "twice": sh.TriangleMesh(BALL.vertices, np.concatenate([BALL.faces, BALL.faces])),
-    "two": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 5, BALL.faces)),
+    "nested": samples.union(BALL, sh.TriangleMesh(0.5 * BALL.vertices, BALL.faces)),
+    "hollow": samples.union(BALL, sh.TriangleMesh(0.5 * BALL.vertices, BALL.faces[:, ::-1])),
+    "one inwards": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 5, BALL.faces[:, ::-1])),
+    "touching": sh.TriangleMesh(*joined(box(n=1), box((0.5, 0.5, 0.5), (1, 0.2, 0.2), n=1))),
+    "crossing": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 1, BALL.faces)),
     "crosses itself": samples.torus(0.4, 0.6, 24, 12),
     "one turned": samples.with_flipped_faces(BALL, 0.01),
     "flat": sh.TriangleMesh(BALL.vertices * [1, 1, 0], BALL.faces),
