@@ -2,6 +2,7 @@
 
     python benchmarks/surface.py [--levels 5 6 7 8] [--peer-up-to 7]
     python benchmarks/surface.py --triangles
+    python benchmarks/surface.py --errors --levels 4 5 6 7
 
 Each program runs in a process of its own, one after the other, on the same mesh and curves: a bumpy sphere and level
 sets that cross its faces, nothing imposed but where said. Seconds of all threads or, with --wall, on the clock; memory
@@ -36,10 +37,14 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3, help="rounds of all programs in turn; the best times count")
     parser.add_argument("--wall", action="store_true", help="seconds on the clock instead of those of all threads")
     parser.add_argument("--triangles", action="store_true", help="what refining bad triangles gains and costs instead")
+    parser.add_argument("--errors", action="store_true", help="seconds beside errors on unit spheres instead")
     parser.add_argument("--worker", nargs=2, help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.triangles:
         auto_refinement.tables()
+        return
+    if arguments.errors:
+        errors(arguments.levels)
         return
     if arguments.worker:
         program, file = arguments.worker
@@ -95,15 +100,49 @@ def write_input(file: Path, level: int) -> int:
     for k, height in enumerate(np.linspace(0.3, -0.3, BATCH + 2)):
         curve = max(mesh.level_set(points @ [0.1, 0.2, 1.0], height), key=lambda c: c.n_points)
         arrays[f"faces{k}"], arrays[f"barycentric{k}"] = curve.faces, curve.barycentric
-        opposite = curve.barycentric.argmin(axis=1)
-        corner = (opposite + 1) % 3
-        edge = mesh.edges.face_edges[curve.faces, corner]
-        rows = np.arange(len(edge))
-        tail_first = mesh.edges.vertices[edge, 0] == mesh.faces[curve.faces, corner]
-        arrays[f"edge{k}"] = edge
-        arrays[f"t{k}"] = curve.barycentric[rows, np.where(tail_first, (corner + 1) % 3, corner)]
+        arrays[f"edge{k}"], arrays[f"t{k}"] = on_edges(mesh, curve)
     np.savez(file, vertices=points, faces=np.asarray(ball.faces), **arrays)
     return len(points)
+
+
+def on_edges(mesh, curve) -> tuple[np.ndarray, np.ndarray]:
+    """The edges that a level set crosses, and where on them, as potpourri3d takes them."""
+    corner = (curve.barycentric.argmin(axis=1) + 1) % 3
+    edge = mesh.edges.face_edges[curve.faces, corner]
+    tail_first = mesh.edges.vertices[edge, 0] == mesh.faces[curve.faces, corner]
+    return edge, curve.barycentric[np.arange(len(edge)), np.where(tail_first, (corner + 1) % 3, corner)]
+
+
+def errors(levels: list[int]) -> None:
+    """Seconds beside errors: a circle on unit spheres, nothing imposed, each up to its best constant."""
+    import potpourri3d as pp3d
+    import trimesh
+
+    import signedheat as sh
+
+    def timed(distance) -> tuple[float, np.ndarray]:
+        begin = time.process_time()
+        values = np.asarray(distance())
+        return time.process_time() - begin, values
+
+    for level in levels:
+        ball = trimesh.creation.icosphere(level)
+        mesh, heights = sh.TriangleMesh(ball.vertices, ball.faces), ball.vertices @ (np.array([1, 2, 10]) / 105**0.5)
+        curve = max(mesh.level_set(heights, 0.2), key=lambda c: c.n_points)
+        nodes = [(int(e), [float(t)]) for e, t in zip(*on_edges(mesh, curve), strict=True)]
+        exact = np.arcsin(heights.clip(-1, 1)) - np.arcsin(0.2)
+        ours = sh.SignedHeatSolver(mesh)
+        theirs = pp3d.MeshSignedHeatSolver(ball.vertices, ball.faces)
+        for name, distance in (
+            ("default", lambda ours=ours, curve=curve: ours.distance(curve, sh.constraints.Free()).values),
+            ("peer", lambda p=theirs, n=nodes: p.compute_distance([[*n, n[0]]], level_set_constraint="None")),
+        ):
+            first, values = timed(distance)
+            values = values * np.sign(values @ exact)
+            away = values - exact - np.median(values - exact)
+            seconds = min(timed(distance)[0] for _ in range(5))
+            error = 100 * np.sqrt((away**2).mean()) / np.ptp(exact)
+            print(f"{len(exact):>9} {name:>10} first {first:7.3f}  next {seconds:7.3f}  ε {error:.4f} %", flush=True)
 
 
 def default(data, clock) -> dict[str, object]:
