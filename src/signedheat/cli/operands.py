@@ -86,6 +86,7 @@ def refuse_completing(arguments: Namespace) -> None:
 def unit_in_use(arguments: Namespace, *paths: str) -> str | None:
     """Return the unit of printed and written lengths, from ``--units`` or the files; None if it is unknown.
 
+    ``--units`` is a unit, such as mm, or two, inch:mm: that of files which state none, and that of the results.
     If only some files state a unit, or they state different ones, the first unit is stored as ``--units``, so that all
     files are scaled to it.
     """

@@ -60,7 +60,7 @@ class Level:
     factors: Ints  # (4,) cells of this grid per cell of the next coarser one: see `coarsening`
 
 
-Guess = tuple[NDArray[np.float32], Bools]
+Held = tuple[NDArray[np.float32], Bools]
 """(l₀, l₁, l₂, n, 4) X on a level, from a finer one, and (l₀, l₁, l₂, stretches) where it is known and not swept."""
 
 
@@ -69,27 +69,28 @@ def diffuse_multilevel(
 ) -> list[Level]:
     """Solve ``(1 − tΔ) X = B``, Eq. 12, on all levels, the finest first; the first `finest` levels are skipped.
 
-    `time` returns t for a mean spacing. Each level is swept in all combinations of directions: `rounds` times, twice as
-    often if it starts from values of a finer level, and `COARSEST_ROUNDS` times if it is the coarsest.
+    `time` returns t for a mean spacing. A coarser level takes over values of the finer one inside of its band, holds
+    them as boundary values, and has no sources of its own. Each level is swept in all combinations of directions:
+    `rounds` times, twice as often if it has such values, and `COARSEST_ROUNDS` times if it is the coarsest.
     """
     levels: list[Level] = []
-    guess = None
+    held = None
     while True:
         factors = coarsening(sources.shape, sources.steps)
         last = not (factors > 1).any()
         if len(levels) >= finest or last:
-            often = COARSEST_ROUNDS if last else rounds if guess is None else 2 * rounds
-            levels.append(_diffuse_level(sources, guess, time, factors, often, last))
+            often = COARSEST_ROUNDS if last else rounds if held is None else 2 * rounds
+            levels.append(_diffuse_level(sources, held, time, factors, often, last))
         else:
             levels.append(Level(None, None, factors))
         if last:
             return levels
         shape, steps = _coarser(sources.shape, sources.steps)
-        guess = None
+        held = None
         if levels[-1].vectors is not None:
             power = np.sqrt(time(_mean_step(sources.steps)) / time(_mean_step(steps)))
-            guess = _carried(levels[-1], shape, power)
-        sources = sources.restricted(factors, shape, steps) if guess is None else NodeSources.empty(shape, steps)
+            held = _carried(levels[-1], shape, power)
+        sources = sources.restricted(factors, shape, steps) if held is None else NodeSources.empty(shape, steps)
 
 
 def coarsening(shape: tuple[int, ...], steps: Floats) -> Ints:
@@ -119,7 +120,7 @@ def skip_finest(shape: tuple[int, ...], steps: Floats, finest: int) -> tuple[lis
 
 
 def _diffuse_level(
-    sources: NodeSources, guess: Guess | None, time: Callable[[float], float], factors: Ints, rounds: int, last: bool
+    sources: NodeSources, held: Held | None, time: Callable[[float], float], factors: Ints, rounds: int, last: bool
 ) -> Level:
     """Solve on one level, within the band around its sources or known values, or everywhere if it is the last.
 
@@ -128,7 +129,7 @@ def _diffuse_level(
     t = time(_mean_step(sources.steps))
     real = sources.steps > 0
     ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
-    given_vectors, known = (None, None) if guess is None else guess
+    given_vectors, known = (None, None) if held is None else held
     start = sources.places >= 0 if known is None else known
     if last:
         active = inside = np.ones_like(start)
@@ -170,7 +171,7 @@ def _coarse_shape(shape: tuple[int, ...], factors: Ints) -> tuple[int, ...]:
     return tuple(n if f == 1 else n // 2 + 1 if f == 2 else 1 for n, f in zip(shape, factors.tolist(), strict=True))
 
 
-def _carried(level: Level, shape: tuple[int, ...], power: float) -> Guess | None:
+def _carried(level: Level, shape: tuple[int, ...], power: float) -> Held | None:
     """Return the values of a level at the nodes of the next coarser one, and where stretches are complete, or None.
 
     Lengths are raised to `power`.

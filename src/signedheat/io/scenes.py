@@ -252,7 +252,10 @@ class _Package:
         return self._bodies[key]
 
     def _bytes(self, part: str) -> bytes:
-        """Return the XML text of a part; no more is unpacked than the archive announces."""
+        """Return the XML text of a part, whose memory is charged to the budget of the file before it is used.
+
+        No more is unpacked than the archive announces. Entities, which may expand to any size, are refused.
+        """
         entry = self._zip.getinfo(part)
         charge(bytes=entry.file_size)
         with self._zip.open(entry) as file:

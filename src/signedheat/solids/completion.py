@@ -427,14 +427,22 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
     if len(sheets):
         surfaces.append(TriangleGroup(vertices[faces[sheets]], faces[sheets], chain.firsts[sheets], closing=False))
     solid = united(surfaces, options.keep_overlaps, notes)
+    _warn_of_guesses(solid, None if torn.any() else once)
+    return solid
+
+
+def _warn_of_guesses(solid: Solid, bounding: Floats | None) -> None:
+    """Warn if much of a solid is completed, or if its lids overrule winding numbers of (m, 3, 3) `bounding` faces.
+
+    These are None if heat completed the solid, since winding numbers tell little about torn bodies.
+    """
     for note in solid.diagnostics.notes:
         if not isinstance(note, CompletedArea):
             continue
         if note.completed_share > MOSTLY_GIVEN:
             warn_user(f"{note}: where so much is missing, the result is a guess", InexactWarning)
-        elif not torn.any() and overruled(solid, once) > MOST_OVERRULED:
+        elif bounding is not None and overruled(solid, bounding) > MOST_OVERRULED:
             warn_user(f'{note}, against the winding numbers of its faces: try lids="flat"', InexactWarning)
-    return solid
 
 
 def overruled(solid: Solid, triangles: Floats) -> float:

@@ -200,9 +200,9 @@ def _vertices(
 ) -> tuple[Floats, Floats, Floats]:
     """Return (p, 3) vertices of pieces of the surface in their cells, middles of pieces, and wider candidates or NaN.
 
-    `cells` are the (p, 3) cells of pieces, and `alone` tells whether a piece has its cell alone. Wider candidates lie
-    up to `OUTSIDE_CELL` outside of their cells. The surface crosses edge `crossed[i]` in piece `owners[i]`, and edge e
-    at `points[e]`.
+    `cells` are the (p, 3) cells of pieces, and `alone` tells whether a piece has its cell alone. A crease or a corner
+    may lie just outside of the cell whose edges show its planes: wider candidates lie up to `OUTSIDE_CELL` outside. The
+    surface crosses edge `crossed[i]` in piece `owners[i]`, and edge e at `points[e]`.
     """
     count = len(cells)
     step = float(grid.spacing.max())
@@ -221,26 +221,50 @@ def _vertices(
     wider = np.full((count, 3), np.nan)
     creased = np.flatnonzero((ranks > 1) & alone)
     if len(creased):
-        # find planes in a cell with a crease that do not cross its edges
-        low, high = lower[creased] - OUTSIDE_CELL * grid.spacing, upper[creased] + OUTSIDE_CELL * grid.spacing
-        probes = ((middles + minima)[creased, None] + PROBE_OFFSETS * grid.spacing).reshape(-1, 3)
-        feet, normals = offset.planes(probes)
-        probed = np.repeat(np.arange(len(creased)), len(PROBE_OFFSETS))
-        feet -= middles[creased][probed]
-        within = ((feet > low[probed]) & (feet < high[probed])).all(axis=1)
-        more = Quadrics.of(probed[within], feet[within], normals[within], len(creased))
-        wider_minima, wider_ranks = minimizers(quadrics[creased] + more, low, high)
-        error = np.abs(offset.distance(middles[creased] + wider_minima))
+        room = OUTSIDE_CELL * grid.spacing
+        farther, farther_ranks = _probed_minima(
+            offset,
+            grid,
+            middles[creased],
+            minima[creased],
+            quadrics[creased],
+            lower[creased] - room,
+            upper[creased] + room,
+        )
+        error = np.abs(offset.distance(middles[creased] + farther))
         # if they lie on the surface, and on more of its planes, on a corner, or where the first minimum does not
         better = (error < ON_LEVEL * step) & (
-            (wider_ranks > ranks[creased]) | (wider_ranks == 3) | (np.abs(off[creased]) > ON_LEVEL * step)
+            (farther_ranks > ranks[creased]) | (farther_ranks == 3) | (np.abs(off[creased]) > ON_LEVEL * step)
         )
-        wider[creased[better]] = middles[creased[better]] + wider_minima[better]
+        wider[creased[better]] = middles[creased[better]] + farther[better]
     for _ in range(2):  # steps of Newton's method towards the surface
         far = np.flatnonzero(np.abs(off) > ON_LEVEL * step)
         minima[far] = np.clip(minima[far] - off[far, None] * gradients[far], lower[far], upper[far])
         off[far], gradients[far] = offset.slopes(middles[far] + minima[far])
     return middles + minima, middles, wider
+
+
+def _probed_minima(
+    offset: ImplicitSurface,
+    grid: Grid,
+    middles: Floats,
+    minima: Floats,
+    quadrics: Quadrics,
+    lower: Floats,
+    upper: Floats,
+) -> tuple[Floats, Ints]:
+    """Return the (n, 3) minima of n quadrics, and ranks, with more planes: those near points around present minima.
+
+    So planes of a crease count that cross no edge of the cell. Positions of `minima`, of the box from `lower` to
+    `upper`, and of the result are relative to `middles`; all are (n, 3).
+    """
+    probes = ((middles + minima)[:, None] + PROBE_OFFSETS * grid.spacing).reshape(-1, 3)
+    feet, normals = offset.planes(probes)
+    owners = np.repeat(np.arange(len(minima)), len(PROBE_OFFSETS))
+    feet -= middles[owners]
+    within = ((feet > lower[owners]) & (feet < upper[owners])).all(axis=1)
+    more = Quadrics.of(owners[within], feet[within], normals[within], len(minima))
+    return minimizers(quadrics + more, lower, upper)
 
 
 def divided_along_creases(

@@ -71,14 +71,16 @@ def frame_of(rim: Floats) -> Frame | None:
 def farthest(loop: Floats, away: Floats) -> int:
     """Return the index of the point of a closed loop, (n, 3), with the largest distance `away`, (n,).
 
-    Of equal ones, it is that after which distances stay larger, so that it does not depend on the first point.
+    Of up to `MOST_TIES` equal ones, it is that after which distances stay larger, so that it does not depend on the
+    first point.
     """
     ties = np.flatnonzero(away > (1 - 1e-9) * away.max())[:MOST_TIES]
     if len(ties) == 1:
         return int(ties[0])
-    starts = shares_of(loop)[0]
+    starts = shares_of(loop)[0]  # (n + 1,) positions along the loop, from 0 to 1
     onward = (starts[ties, None] + np.arange(MOST_TIES) / MOST_TIES) % 1.0
     far = np.interp(onward, starts, np.append(away, away[0])) / max(float(away.max()), 1e-300)
+    # the last row in lexicographic order has the largest distance where rows first differ
     return int(ties[np.lexsort(np.rint(1e6 * far).T[::-1])[-1]])
 
 
@@ -296,12 +298,12 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
     """Bend a lid as a thin plate whose rest shape is as curved as the surface behind its rim (Helfrich 1973).
 
     ``min Σ |(L x)_v − m_v κ_v n_v − Σ_e ½ |e| g_e|² / (m_v + s_v)``. L is the cotangent Laplacian, m the areas of
-    vertices, κ twice the mean curvature at the rim and harmonic inside, and g_e = e × n / |e × n| the direction across
-    the edge e of the rim in the plane with the normal n: where the surface goes on smoothly, ∂x/∂g = g there. Springs
-    hold the lid to this: s is 0 where it is clamped, and s_v = (1 / h_v − 1) ¼ W Σ_e ½ |e| where it is held by h_v,
-    which is half as stiff as a disc of width W for h = ½. Spheres and cylinders are continued as such. Each round takes
-    m, L and n from the one before; when a move exceeds the last one, all later moves are halved, so that the plate
-    comes to rest. Normals, curvatures and held are those of `continuation`.
+    vertices, κ twice the mean curvature times h at the rim and harmonic inside, and g_e = e × n / |e × n| the direction
+    across the edge e of the rim in the plane with the normal n: where the surface goes on smoothly, ∂x/∂g = g there.
+    Springs hold the lid to this. Their compliance s is 0 where it is clamped, and s_v = (1 / h_v − 1) ¼ W Σ_e ½ |e|
+    where it is held by h_v: for h = ½ they are half as stiff as a disc of width W. Spheres and cylinders are
+    continued as such. Each round takes m, L and n from the one before; when a move exceeds the last one, all later
+    moves are halved, so that the plate comes to rest. Normals, curvatures and held are those of `continuation`.
 
     Return None if the lid moves farther than its rim is wide, as on very ragged rims.
     """
@@ -323,7 +325,7 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
         weights = 1.0 / weights
         # weighted least squares for the inner vertices x: the residual is inner · x + known
         known = matrix[:, :n] @ rim - (areas * rest)[:, None] * up
-        known[:n] += load
+        known[:n] += load  # the terms with −g_e
         inner = matrix[:, n:]
         normal_matrix = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
         vertices = lid.vertices.copy()

@@ -83,10 +83,11 @@ def default_diffusion(discretization: Discretization) -> Diffusion:
 
 
 def lowered_for_times(discretization: Discretization, sources: Sequence[Any], diffusion: Diffusion) -> list[SourceTerm]:
-    """Lower the sources for a diffusion time, and once more for the parts of a surface in which curves end.
+    """Lower the sources for a diffusion time, and once more with a shorter time for components in which curves end.
 
-    With `Extrapolated` there are one or two results: the source for all parts, with directions to be extrapolated, and
-    the source with a third of the time, for the parts in which curves end. Either is left out if no part needs it.
+    With `Extrapolated` there are one or two results. The first covers the whole surface, and its directions are to be
+    extrapolated in time. The second has a third of the time, and its directions replace those of the first on the faces
+    of components of the surface in which a curve ends (`blended`). Either is left out if it is used on no face.
     """
     if not isinstance(diffusion, Extrapolated):
         return [discretization.lower(sources, diffusion)]
@@ -96,7 +97,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
             "directions are extrapolated in time on surfaces only", remedy="pass a number", element="diffusion"
         )
     at_ends = replace(source, time=source.time / Extrapolated.tau)  # by default τ is then 1, as in the paper
-    if all(source.ending[part.nodes.faces].all() for part in source.parts):  # curves end in every part with a source
+    if all(source.ending[curve.nodes.faces].all() for curve in source.parts):  # in all components with a source
         return [at_ends]
     everywhere = replace(source, extrapolated=True)
     return [everywhere, at_ends] if source.ending.any() else [everywhere]
@@ -105,7 +106,7 @@ def lowered_for_times(discretization: Discretization, sources: Sequence[Any], di
 def blended(sources: Sequence[SourceTerm], directions: Iterable[NDArray[Any]]) -> NDArray[Any]:
     """Return Y on all faces, (m,), from the directions, (m,), computed for each source of `lowered_for_times`.
 
-    Parts of the surface in which curves end have the directions of the last source, the others those of the first.
+    Components of the surface in which curves end have the directions of the last source, the others those of the first.
     """
     everywhere, *at_ends = directions
     for ending in at_ends:
