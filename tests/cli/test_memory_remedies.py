@@ -93,14 +93,15 @@ def test_files_that_would_not_fit_while_they_are_read_are_refused(tmp_path, endi
 
 
 def test_surfaces_of_too_many_faces_to_do_anything_with_are_refused(tmp_path, monkeypatch):
+    ball = samples.sphere(5)
+    ball.save(tmp_path / "ball.ply")
     monkeypatch.setattr(shapes, "CHECKED_FACES", 1000)
     monkeypatch.setattr(memory, "_free", lambda: memory.libraries() + 1_000_000)
-    samples.sphere(5).save(tmp_path / "ball.ply")
     monkeypatch.setattr(files, "BYTES_PER_FILE_BYTE", {})
     with pytest.raises(sh.errors.MemoryLimitError) as caught:
         sh.read(tmp_path / "ball.ply")
     most = int(re.search(r"at most ([0-9,]+) faces", caught.value.remedy).group(1).replace(",", ""))
-    assert 1000 < most < samples.sphere(5).n_faces
+    assert 1000 < most < ball.n_faces
 
 
 def test_where_faces_alone_take_all_memory_no_spacing_is_told(folder, monkeypatch, capsys):
