@@ -58,6 +58,14 @@ def numbers(values: object, name: str, error: type[SignedHeatError] = GeometryEr
         raise error(f"{name} must be real numbers, not {_described(array)}", element=name) from None
 
 
+def json_numbers(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> Floats:
+    """Return numbers of JSON, in lists of any depth, as a float64 array; refuse texts, true and false."""
+    array = numbers(values, name, error)
+    if any(isinstance(value, bool) for value in np.array(values, dtype=object).flat):
+        raise error(f"{name} must be real numbers, and one is true or false", element=name)
+    return array
+
+
 @within_memory
 def contiguous(values: object, name: str) -> Floats:
     """Return `values` as a contiguous float64 array of any shape, copied only if necessary."""

@@ -21,7 +21,7 @@ from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.surface import closest_points
 from ..surfaces.surface_curves import Curve, CurveOrPoints, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import flag, numbers
+from ..validation import flag, json_numbers
 from .files import PathLike, damaged, format_for, reading, replacing, text
 from .mesh_files import read_obj_elements
 from .numerals import integer, integers, json_of, vector
@@ -241,7 +241,7 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
         if "polylines" not in content:
             return groups_of(content)
         lines = [
-            (numbers(line["points"], "points", FileFormatError), flag(line.get("closed", False), "closed"))
+            (json_numbers(line["points"], "points", FileFormatError), flag(line.get("closed", False), "closed"))
             for line in content["polylines"]
         ]
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:

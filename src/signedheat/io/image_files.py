@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Floats
 from ..errors import FileFormatError, quoted
 from ..packages import lazy_module
-from ..validation import numbers
+from ..validation import json_numbers
 from .budgets import charge, charge_words
 from .files import (
     PathLike,
@@ -111,7 +111,7 @@ def _read_npy(path: PathLike) -> Image:
     with reading(companion):
         about = json_of(contents(companion))
         origin = vector(about["origin"], "origin", values.ndim)
-        spacing = numbers(about["spacing"], "spacing", FileFormatError)
+        spacing = json_numbers(about["spacing"], "spacing", FileFormatError)
         return _aligned(values, origin, spacing)
 
 

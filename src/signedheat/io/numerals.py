@@ -15,7 +15,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from ..arrays import Floats, Ints
 from ..errors import FileFormatError, quoted
-from ..validation import INT64_END, numbers
+from ..validation import INT64_END, json_numbers
 from .budgets import JSON, charge_tree
 from .files import damaged
 
@@ -48,8 +48,8 @@ def json_of(content: str | bytes) -> Any:
 
 
 def vector(values: object, name: str, count: int) -> Floats:
-    """Convert numbers of JSON to a (count,) array; refuse texts, NaN and infinity."""
-    array = numbers(values, name, FileFormatError)
+    """Convert numbers of JSON to a (count,) array; refuse texts, true and false, NaN and infinity."""
+    array = json_numbers(values, name, FileFormatError)
     if array.shape != (count,) or not np.isfinite(array).all():
         raise damaged(f"{name} must be {count} finite numbers", element=name)
     return array

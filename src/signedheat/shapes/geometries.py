@@ -9,7 +9,7 @@ from typing import Any, Protocol, cast
 from ..errors import GeometryError, UnsupportedTypeError
 from ..grids.polyline import Polyline
 from ..packages import lazy_module
-from ..validation import numbers
+from ..validation import json_numbers
 
 shapely: Any = lazy_module("shapely", "geometries of shapely")
 
@@ -79,7 +79,7 @@ def _polyline(points: Any, closed: bool) -> Polyline:
         raise GeometryError(
             f"coordinates of a geometry must be pairs of numbers ({error})", element="coordinates"
         ) from error
-    positions = numbers(pairs, "coordinates")
+    positions = json_numbers(pairs, "coordinates")
     return Polyline(positions, closed or (len(positions) > 2 and bool((positions[0] == positions[-1]).all())))
 
 
