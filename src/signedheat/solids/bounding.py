@@ -22,7 +22,7 @@ from ..mesh.triangles import cone_volumes
 from ..parallel import PointTree
 from ..search.winding_tree import WindingTree
 from .chain import Chain
-from .gauss import Dipoles, Matrix, Pieces, are_soups, means, sampled, without_slender
+from .gauss import Dipoles, Matrix, Pieces, are_soups, elements, means, sampled
 from .overlaps import HINT, SHEET, Nesting, Rims, bodies_around, directed, levels_of_pieces
 from .readings import Reading, as_given, mixed, once, unexplained
 from .rims import meeting_edges, open_edges
@@ -515,13 +515,14 @@ def _along_closed(chain: Chain, pieces: Ints, clusters: Ints, counts: Floats | I
 def clusters_of(pieces: Pieces) -> Ints:
     """(p,) cluster of each piece: pieces are connected if within `GAP_REACH` sizes of the smaller one of each other."""
     n = len(pieces.areas)
+    if n == 1:
+        return np.zeros(1, dtype=np.int64)
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
     np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
     radii = 0.5 * np.linalg.norm(high - low, axis=1)
-    elements = without_slender(pieces)
-    faces, points = sampled(elements, min(len(elements.labels), 100_000))
-    owners = elements.labels[faces]
+    parts, faces = elements(pieces)
+    owners, points = parts.labels[faces], parts.triangles[faces].mean(axis=1)
     away, near = PointTree(points).query(points, min(9, len(points)))  # itself and 8
     away, others = away.reshape(len(points), -1), owners[near].reshape(len(points), -1)
     joined = away < 2 * GAP_REACH * np.minimum(radii[owners][:, None], radii[others])

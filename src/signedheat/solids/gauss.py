@@ -205,6 +205,13 @@ def without_slender(pieces: Pieces) -> Pieces:
     return Pieces(triangles, labels)
 
 
+def elements(pieces: Pieces) -> tuple[Pieces, Ints]:
+    """Return the pieces without slender triangles, and (n,) all of their triangles, or `MOST_DIPOLES` drawn evenly."""
+    pieces = without_slender(pieces)
+    n = len(pieces.triangles)
+    return pieces, np.arange(n) if n <= MOST_DIPOLES else np.unique(sampled(pieces, MOST_DIPOLES)[0])
+
+
 def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
     """Sample points on pieces: (n,) the faces they are on, and (n, 3) positions.
 
@@ -305,11 +312,10 @@ class Dipoles:
 
     @classmethod
     def of_triangles(cls, pieces: Pieces) -> Dipoles:
-        """Make a dipole for each triangle, or for `MOST_DIPOLES` of them; slender triangles are halved first."""
-        pieces = without_slender(pieces)
-        faces, areas = np.arange(len(pieces.triangles)), pieces.face_areas
-        if len(faces) > MOST_DIPOLES:
-            faces = np.unique(sampled(pieces, MOST_DIPOLES)[0])
+        """Make a dipole for each of the `elements` of pieces."""
+        pieces, faces = elements(pieces)
+        areas = pieces.face_areas
+        if len(faces) < len(areas):
             kept = np.bincount(pieces.labels[faces], areas[faces], len(pieces.areas))
             areas = areas * (pieces.areas / np.maximum(kept, np.finfo(float).tiny))[pieces.labels]
         triangles = pieces.triangles[faces]
