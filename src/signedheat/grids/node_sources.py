@@ -46,14 +46,14 @@ class NodeSources(NamedTuple):
         used = weights > 0
         lines, offsets = np.divmod(nodes[used], shape[3])
         empty = cls.empty(shape, steps)
-        flat = empty.places.reshape(-1)
+        rows_of_stretches = empty.places.reshape(-1)
         stretches = lines * empty.places.shape[3] + offsets // STRETCH
-        flat[stretches] = 0
-        first_ids = np.flatnonzero(flat == 0)
-        flat[first_ids] = np.arange(len(first_ids))
-        places = flat[stretches] * STRETCH + offsets % STRETCH
+        rows_of_stretches[stretches] = 0  # marked, then numbered in order
+        stored = np.flatnonzero(rows_of_stretches == 0)
+        rows_of_stretches[stored] = np.arange(len(stored))
+        places = rows_of_stretches[stretches] * STRETCH + offsets % STRETCH
         owners = np.nonzero(used)[0]
-        sums = np.zeros((STRETCH * len(first_ids), 4), dtype=np.float32)
+        sums = np.zeros((STRETCH * len(stored), 4), dtype=np.float32)
         for k in range(values.shape[1]):
             sums[:, k] = np.bincount(places, weights[used] * values[owners, k], len(sums))
         return cls(empty.places, sums.reshape(-1, STRETCH, 4), shape, steps)
@@ -117,117 +117,122 @@ def _merge(
     """Do the work of `merge_in_cells`, simplex by simplex in `order`, by component.
 
     Return (s, 2 d + 1) sums of weight · position, vector and weight by component and cell, their (s,) components, and
-    `sums` of the sources. `slots` are zeros, one for each cell; they become 1 + the sample of a cell. Each simplex is
-    bisected at its longest edge until no edge is longer than `size`; each part is added at its centre.
+    `sums` of the sources. Each simplex is bisected at its longest edge until no edge is longer than `size`; each part
+    is added at its centre. `slots` are zeros, one for each cell; they become 1 + the sample of a cell. One array serves
+    all components, since samples of earlier ones have lower numbers, and count as none.
     """
-    nodes, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
+    rows, places = sources.sums, sources.places.reshape(-1, sources.places.shape[3])
     n_corners, dimension = corners.shape[1], corners.shape[2]
     deepest = 256
-    stack = np.empty((deepest, n_corners, dimension))
-    shares = np.empty(deepest)  # of the whole simplex
-    sums, labels = np.zeros((1024, 2 * dimension + 1)), np.zeros(1024, dtype=np.int64)
-    count, used = 0, nodes.shape[0]
-    first = 0  # slots of the current component start here
-    current = np.int64(-1)
+    stack = np.empty((deepest, n_corners, dimension))  # corners of the parts that are still to be added
+    shares = np.empty(deepest)  # their shares of the whole simplex
+    samples, labels_of = np.zeros((1024, 2 * dimension + 1)), np.zeros(1024, dtype=np.int64)
+    n_samples, n_rows = 0, rows.shape[0]
+    first_of_component = 0  # first sample of the current component
+    component = np.int64(-1)
     centre = np.empty(dimension)
-    lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # grid lines around a piece, and its share of each
-    parts = np.empty(1 << (dimension - 1))
-    n = shape[dimension - 1]
-    limit, part_of_corner = size * size, 1.0 / n_corners
+    lines = np.zeros(1 << (dimension - 1), dtype=np.int64)  # the grid lines around a part, and what each gets of it
+    line_shares = np.empty(1 << (dimension - 1))
+    n_along = shape[dimension - 1]
+    longest_allowed, per_corner = size * size, 1.0 / n_corners
     for face in order:
         if weights[face] == 0.0:
             continue
-        if components[face] != current:
-            current = components[face]
-            first = count
-        for c in range(n_corners):
-            for d in range(dimension):
-                stack[0, c, d] = corners[face, c, d]
+        if components[face] != component:
+            component = components[face]
+            first_of_component = n_samples
+        for corner in range(n_corners):
+            for axis in range(dimension):
+                stack[0, corner, axis] = corners[face, corner, axis]
         shares[0] = 1.0
         top = 1
         while top > 0:
             top -= 1
+            # leave out parts beyond the grid
             missed = False
-            for d in range(dimension):
-                low = high = stack[top, 0, d]
-                for c in range(1, n_corners):
-                    low = min(low, stack[top, c, d])
-                    high = max(high, stack[top, c, d])
-                if high < 0.0 or low > shape[d] - 1:
+            for axis in range(dimension):
+                low = high = stack[top, 0, axis]
+                for corner in range(1, n_corners):
+                    low = min(low, stack[top, corner, axis])
+                    high = max(high, stack[top, corner, axis])
+                if high < 0.0 or low > shape[axis] - 1:
                     missed = True
             if missed:
                 continue
-            longest = -1.0  # squared length of the longest edge, from corner tail to head
-            tail, head = 0, 0
-            for c in range(n_corners):
-                for e in range(c):
+            # bisect long parts: one half replaces the part on the stack, the other is put on top
+            longest, tail, head = -1.0, 0, 0  # squared length of the longest edge, and its corners
+            for corner in range(n_corners):
+                for other in range(corner):
                     square = 0.0
-                    for d in range(dimension):
-                        square += (stack[top, c, d] - stack[top, e, d]) ** 2
+                    for axis in range(dimension):
+                        square += (stack[top, corner, axis] - stack[top, other, axis]) ** 2
                     if square > longest:
-                        longest, tail, head = square, e, c
-            if longest > limit and top + 2 < deepest:
+                        longest, tail, head = square, other, corner
+            if longest > longest_allowed and top + 2 < deepest:
                 half = 0.5 * shares[top]
-                for c in range(n_corners):
-                    for d in range(dimension):
-                        stack[top + 1, c, d] = stack[top, c, d]
-                for d in range(dimension):
-                    middle = 0.5 * (stack[top, tail, d] + stack[top, head, d])
-                    stack[top, tail, d] = middle
-                    stack[top + 1, head, d] = middle
+                for corner in range(n_corners):
+                    for axis in range(dimension):
+                        stack[top + 1, corner, axis] = stack[top, corner, axis]
+                for axis in range(dimension):
+                    middle = 0.5 * (stack[top, tail, axis] + stack[top, head, axis])
+                    stack[top, tail, axis] = middle
+                    stack[top + 1, head, axis] = middle
                 shares[top] = shares[top + 1] = half
                 top += 2
                 continue
+            # the cell of the centre, in C order, and its sample
             cell = np.int64(0)
-            for d in range(dimension):
+            for axis in range(dimension):
                 mean = 0.0
-                for c in range(n_corners):
-                    mean += stack[top, c, d]
-                mean *= part_of_corner
-                centre[d] = mean
-                if mean < 0.0 or mean > shape[d] - 1:
+                for corner in range(n_corners):
+                    mean += stack[top, corner, axis]
+                mean *= per_corner
+                centre[axis] = mean
+                if mean < 0.0 or mean > shape[axis] - 1:
                     missed = True
-                cell = cell * (shape[d] - 1) + min(max(np.int64(mean), 0), shape[d] - 2)
+                cell = cell * (shape[axis] - 1) + min(max(np.int64(mean), 0), shape[axis] - 2)
             if missed:
                 continue
             slot = slots[cell] - 1
-            if slot < first:
-                if count == len(sums):
-                    sums = np.concatenate((sums, np.zeros_like(sums)))
-                    labels = np.concatenate((labels, np.zeros_like(labels)))
-                slot = count
-                labels[slot] = current
-                count += 1
-                slots[cell] = count
+            if slot < first_of_component:
+                if n_samples == len(samples):
+                    samples = np.concatenate((samples, np.zeros_like(samples)))
+                    labels_of = np.concatenate((labels_of, np.zeros_like(labels_of)))
+                slot = n_samples
+                labels_of[slot] = component
+                n_samples += 1
+                slots[cell] = n_samples
             share = shares[top]
             weight = weights[face] * share
-            if used + (1 << dimension) > nodes.shape[0]:
-                more = np.zeros((len(nodes) + (1 << dimension), STRETCH, 4), dtype=np.float32)
-                nodes = np.concatenate((nodes, more))
-            lines[0], parts[0] = 0, share / scale
-            for d in range(dimension - 1):
-                below = min(max(np.int64(centre[d]), 0), shape[d] - 2)
-                f = centre[d] - below
-                for k in range(1 << d):
-                    line, part = lines[k] * shape[d] + below, parts[k]
-                    lines[k], parts[k] = line, part * (1.0 - f)
-                    lines[k + (1 << d)], parts[k + (1 << d)] = line + 1, part * f
-            below = min(max(np.int64(centre[dimension - 1]), 0), n - 2)
-            f = centre[dimension - 1] - below
+            # share the vector among the nodes of the cell: first by grid lines, then by the two nodes on each line
+            if n_rows + (1 << dimension) > rows.shape[0]:
+                more = np.zeros((len(rows) + (1 << dimension), STRETCH, 4), dtype=np.float32)
+                rows = np.concatenate((rows, more))
+            lines[0], line_shares[0] = 0, share / scale
+            for axis in range(dimension - 1):
+                below = min(max(np.int64(centre[axis]), 0), shape[axis] - 2)
+                fraction = centre[axis] - below
+                for k in range(1 << axis):
+                    line, part = lines[k] * shape[axis] + below, line_shares[k]
+                    lines[k], line_shares[k] = line, part * (1.0 - fraction)
+                    lines[k + (1 << axis)], line_shares[k + (1 << axis)] = line + 1, part * fraction
+            below = min(max(np.int64(centre[dimension - 1]), 0), n_along - 2)
+            fraction = centre[dimension - 1] - below
             for k in range(1 << (dimension - 1)):
-                if parts[k] > 0.0:
+                if line_shares[k] > 0.0:
                     for side in range(2):
-                        part = parts[k] * (f if side else 1.0 - f)
+                        part = line_shares[k] * (fraction if side else 1.0 - fraction)
                         if part > 0.0:
-                            m = below + side
-                            row = places[lines[k], m // STRETCH]
+                            node = below + side
+                            row = places[lines[k], node // STRETCH]
                             if row < 0:
-                                row = places[lines[k], m // STRETCH] = used
-                                used += 1
-                            for d in range(dimension):
-                                nodes[row, m % STRETCH, d] += np.float32(part * vectors[face, d])
-            for d in range(dimension):
-                sums[slot, d] += weight * centre[d]
-                sums[slot, dimension + d] += vectors[face, d] * share
-            sums[slot, 2 * dimension] += weight
-    return sums[:count], labels[:count], nodes[:used]
+                                row = places[lines[k], node // STRETCH] = n_rows
+                                n_rows += 1
+                            for axis in range(dimension):
+                                rows[row, node % STRETCH, axis] += np.float32(part * vectors[face, axis])
+            # add to the sample
+            for axis in range(dimension):
+                samples[slot, axis] += weight * centre[axis]
+                samples[slot, dimension + axis] += vectors[face, axis] * share
+            samples[slot, 2 * dimension] += weight
+    return samples[:n_samples], labels_of[:n_samples], rows[:n_rows]

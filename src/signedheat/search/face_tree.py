@@ -111,7 +111,7 @@ class FaceFeatures(NamedTuple):
 
 
 def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, bound: Bools, n_vertices: int) -> tuple[Bools, Bools]:
-    """Return (e,) whether each edge is regular, and (n,) whether each vertex is.
+    """Return (e,) whether each edge is regular, and (n,) whether each vertex is, as `FaceFeatures` says.
 
     `bound`, (m,), says whether each face is. `edge_normals`, (e, 3), are sums of the unit normals of faces.
     """
@@ -121,22 +121,23 @@ def _regular(faces: Ints, table: EdgeTable, edge_normals: Floats, bound: Bools, 
         & (np.einsum("ei,ei->e", edge_normals, edge_normals) > FOLDED_EDGE**2)
     )
     edges[table.face_edges[~bound]] = False
+    # a fan is connected by halfedges that leave the same vertex: each, and the one after its mate in the next face
     mates = np.where(edges[table.face_edges].ravel(), table.mates, -1)
     paired = np.flatnonzero(mates >= 0)
     opposite = mates[paired]
     following = np.where(opposite % 3 < 2, opposite + 1, opposite - 2)
-    fans = connected_components(len(mates), paired, following)  # both leave the same vertex
-    corners, fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
-    fan[corners] = fans
+    fans = connected_components(len(mates), paired, following)
+    corners, some_fan = faces.ravel(), np.empty(n_vertices, dtype=np.int64)
+    some_fan[corners] = fans
     vertices = np.ones(n_vertices, dtype=bool)
-    vertices[corners[fans != fan[corners]]] = False  # several cones touch at these
+    vertices[corners[fans != some_fan[corners]]] = False  # several fans touch at these
     vertices[table.vertices[~edges]] = False
     return edges, vertices
 
 
 def _copies(faces: Ints, table: EdgeTable) -> Bools:
     """Return (m,) bool, true for faces with the same corners, in the same cyclic order, as an earlier face."""
-    copies, ahead = np.zeros(len(faces), dtype=bool), (table.face_counts + table.balance) // 2
+    copies, ahead = np.zeros(len(faces), dtype=bool), (table.face_counts + table.balance) // 2  # (e,) halfedges ahead
     alike = np.where(table.forward, ahead[table.face_edges], (table.face_counts - ahead)[table.face_edges])
     beside_others = np.flatnonzero((alike > 1).all(axis=1))  # other faces run along all edges of these as they do
     if len(beside_others):
@@ -225,23 +226,32 @@ class FaceTree:
 def _discs(corners: Floats, tree: BoxTree) -> Floats:
     """Compute `FaceTree.discs`, (2 · leaves, 8): for each node of the tree, a flat disc that contains all its faces.
 
-    Discs are convex, so it is enough that they contain the corners, (m, 9).
+    Discs are convex, so it is enough that they contain the corners, (m, 9). The normal is that of the sum of area
+    vectors, and the middle that of the box, moved along the normal until it is halfway between the outermost corners.
     """
     bounds, items = tree.bounds, tree.items
     leaves = len(bounds) // 2
     discs = np.full((2 * leaves, 8), -1.0)
-    first = max(1, leaves >> 7)  # eight levels: higher nodes are not flat
-    below = BOXES_PER_LEAF * leaves // first
-    for node in range(first, 2 * leaves):
-        if node == 2 * first:
-            first, below = node, below // 2
-        begin = (node - first) * below
+    first_node = max(1, leaves >> 7)  # eight levels: higher nodes are not flat
+    n_items = BOXES_PER_LEAF * leaves // first_node  # below each node of a level, which begins with `first_node`
+    for node in range(first_node, 2 * leaves):
+        if node == 2 * first_node:
+            first_node, n_items = node, n_items // 2
+        begin = (node - first_node) * n_items
         nx, ny, nz = 0.0, 0.0, 0.0
-        for at in range(begin, begin + below):
+        for at in range(begin, begin + n_items):
             if items[at] >= 0:
-                f = items[at]
-                ax, ay, az = corners[f, 3] - corners[f, 0], corners[f, 4] - corners[f, 1], corners[f, 5] - corners[f, 2]
-                bx, by, bz = corners[f, 6] - corners[f, 0], corners[f, 7] - corners[f, 1], corners[f, 8] - corners[f, 2]
+                face = items[at]
+                ax, ay, az = (
+                    corners[face, 3] - corners[face, 0],
+                    corners[face, 4] - corners[face, 1],
+                    corners[face, 5] - corners[face, 2],
+                )
+                bx, by, bz = (
+                    corners[face, 6] - corners[face, 0],
+                    corners[face, 7] - corners[face, 1],
+                    corners[face, 8] - corners[face, 2],
+                )
                 nx, ny, nz = nx + ay * bz - az * by, ny + az * bx - ax * bz, nz + ax * by - ay * bx
         length = np.sqrt(nx * nx + ny * ny + nz * nz)
         if not length > 0.0:
@@ -249,11 +259,15 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
         nx, ny, nz = nx / length, ny / length, nz / length
         x, y = 0.5 * (bounds[node, 0] + bounds[node, 3]), 0.5 * (bounds[node, 1] + bounds[node, 4])
         z = 0.5 * (bounds[node, 2] + bounds[node, 5])
-        square, low, high = 0.0, np.inf, -np.inf
-        for at in range(begin, begin + below):
+        square, low, high = 0.0, np.inf, -np.inf  # squared radius, and lowest and highest corner along the normal
+        for at in range(begin, begin + n_items):
             if items[at] >= 0:
-                for c in range(0, 9, 3):
-                    ax, ay, az = corners[items[at], c] - x, corners[items[at], c + 1] - y, corners[items[at], c + 2] - z
+                for column in range(0, 9, 3):
+                    ax, ay, az = (
+                        corners[items[at], column] - x,
+                        corners[items[at], column + 1] - y,
+                        corners[items[at], column + 2] - z,
+                    )
                     along = ax * nx + ay * ny + az * nz
                     low, high = min(low, along), max(high, along)
                     square = max(square, ax * ax + ay * ay + az * az - along * along)

@@ -3,9 +3,10 @@
 The nearest point of a triangle to a point is called its foot. The feature of a foot is 0 inside the triangle, 1, 2, 3
 on its edges (corner 0–1, 1–2, 2–0), and 4, 5, 6 at its corners 0, 1, 2.
 
-Kernels take triangles as ``rows``, (m, 16). Columns 0–2 are the first corner, 3–5 and 6–8 the unit vectors along the
-first side and across it in the plane. In these axes, (p, q), column 9 is the length of the first side, 10–11 and 12 are
-the direction and length of side 0–2, and 13–14 and 15 those of side 1–2.
+Kernels take triangles as ``rows``, (m, 16). Columns 0–2 are the first corner, 3–5 and 6–8 the unit vectors u along the
+first side and v across it in the plane. In these axes, with coordinates (p, q), column 9 is the length of side 0–1,
+10–11 and 12 are the direction (c, d) and length of side 0–2, and 13–14 and 15 the direction (g, h) and length of side
+1–2. Kernels use these letters, and t for the distance of a foot from the beginning of a side.
 """
 
 from __future__ import annotations
@@ -40,24 +41,24 @@ def _rows(corners: Floats) -> Floats:
     """Return the (m, 16) rows of triangles with (m, 9) coordinates of corners, without threads."""
     rows = np.empty((len(corners), 16))
     rows[:, :3] = corners[:, :3]
-    u, v = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))
-    length = np.sqrt(_dot(u, u))
-    u = np.where(length > 0.0, u / np.where(length > 0.0, length, 1.0), [[1.0], [0.0], [0.0]])
-    across = _dot(v, u)
-    w = v - across * u
-    flat = ~(np.sqrt(_dot(w, w)) > LEAST_HEIGHT * np.abs(across))
+    first, second = (corners[:, k : k + 3].T - corners[:, :3].T for k in (3, 6))  # sides 0–1 and 0–2
+    length = np.sqrt(_dot(first, first))
+    u = np.where(length > 0.0, first / np.where(length > 0.0, length, 1.0), [[1.0], [0.0], [0.0]])
+    p = _dot(second, u)
+    v = second - p * u
+    flat = ~(np.sqrt(_dot(v, v)) > LEAST_HEIGHT * np.abs(p))
     # a flat triangle gets some plane through its first side
-    w = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), w)
+    v = np.where(flat, np.arange(3)[:, None] == np.abs(u).argmin(axis=0), v)
     for _ in range(2):  # twice, since the height of slivers has few accurate digits
-        w = w - _dot(w, u) * u
-        w /= np.sqrt(_dot(w, w))
-    up = np.where(flat, 0.0, _dot(v, w))
-    rows[:, 3:6], rows[:, 6:9], rows[:, 9] = u.T, w.T, length
-    for k in range(2):
-        along = across - k * length
-        side = np.sqrt(along * along + up * up)
-        whole = np.where(side > 0.0, side, 1.0)
-        rows[:, 10 + 3 * k], rows[:, 11 + 3 * k] = np.where(side > 0.0, along / whole, 1.0), up / whole
+        v = v - _dot(v, u) * u
+        v /= np.sqrt(_dot(v, v))
+    q = np.where(flat, 0.0, _dot(second, v))
+    rows[:, 3:6], rows[:, 6:9], rows[:, 9] = u.T, v.T, length
+    for k in range(2):  # sides 0–2 and 1–2, which both end at corner 2, (p, q)
+        along = p - k * length
+        side = np.sqrt(along * along + q * q)
+        divisor = np.where(side > 0.0, side, 1.0)
+        rows[:, 10 + 3 * k], rows[:, 11 + 3 * k] = np.where(side > 0.0, along / divisor, 1.0), q / divisor
         rows[:, 12 + 3 * k] = side
     return rows
 
@@ -72,7 +73,7 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
     """Find the foot of a point (x, y, z) on triangle f, the triangle's nearest point.
 
     Returns the squared distance, the feature of the foot (0 inside, 1 to 3 on edges, 4 to 6 at corners), and its three
-    coordinates.
+    coordinates. A point that is not above the inside has its foot on the nearest side.
     """
     px, py, pz = x - rows[f, 0], y - rows[f, 1], z - rows[f, 2]
     p = px * rows[f, 3] + py * rows[f, 4] + pz * rows[f, 5]
@@ -81,10 +82,12 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
     r = p - length
     feature = 0
     if not (q > 0.0 and p * rows[f, 11] > q * rows[f, 10] and r * rows[f, 14] < q * rows[f, 13]):
+        # side 0–1
         t = p if p > 0.0 else 0.0
         t = t if t < length else length
-        best, s, up = (p - t) * (p - t) + q * q, t, 0.0
+        best, foot_p, foot_q = (p - t) * (p - t) + q * q, t, 0.0
         feature = 4 if not t > 0.0 else 1 if t < length else 5
+        # side 0–2
         side = rows[f, 12]
         t = p * rows[f, 10] + q * rows[f, 11]
         t = t if t > 0.0 else 0.0
@@ -92,21 +95,22 @@ def foot_on_triangle(rows: Floats, f: int, x: float, y: float, z: float) -> tupl
         a, b = t * rows[f, 10], t * rows[f, 11]
         square = (p - a) * (p - a) + (q - b) * (q - b)
         if square < best:
-            best, s, up = square, a, b
+            best, foot_p, foot_q = square, a, b
             feature = 3 if t < side else 6
+        # side 1–2 between its ends, which the other two sides have, too
         side = rows[f, 15]
         t = r * rows[f, 13] + q * rows[f, 14]
         if t > 0.0 and t < side:
             a, b = length + t * rows[f, 13], t * rows[f, 14]
             square = (p - a) * (p - a) + (q - b) * (q - b)
             if square < best:
-                s, up = a, b
+                foot_p, foot_q = a, b
                 feature = 2
     else:
-        s, up = p, q
-    dx = px - s * rows[f, 3] - up * rows[f, 6]
-    dy = py - s * rows[f, 4] - up * rows[f, 7]
-    dz = pz - s * rows[f, 5] - up * rows[f, 8]
+        foot_p, foot_q = p, q
+    dx = px - foot_p * rows[f, 3] - foot_q * rows[f, 6]
+    dy = py - foot_p * rows[f, 4] - foot_q * rows[f, 7]
+    dz = pz - foot_p * rows[f, 5] - foot_q * rows[f, 8]
     return dx * dx + dy * dy + dz * dz, feature, x - dx, y - dy, z - dz
 
 
@@ -128,11 +132,13 @@ def away_from_triangle(rows: Floats, f: int, points: Floats, at: int, out: Float
         x, y, z = points[0, k] - ax, points[1, k] - ay, points[2, k] - az
         p, q = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz
         up = x * nx + y * ny + z * nz
+        # vector (a, b) in the plane from the foot on side 0–1, and in `beyond` whether the point is beyond that side
         t = p if p > 0.0 else 0.0
         t = t if t < first else first
         a, b = p - t, q
         square = a * a + b * b
         beyond = -q
+        # side 0–2
         out_of = q * c - p * d
         beyond = beyond if beyond > out_of else out_of
         t = p * c + q * d
@@ -142,6 +148,7 @@ def away_from_triangle(rows: Floats, f: int, points: Floats, at: int, out: Float
         other = i * i + j * j
         nearer = other < square
         a, b, square = i if nearer else a, j if nearer else b, other if nearer else square
+        # side 1–2
         r = p - first
         out_of = r * h - q * g
         beyond = beyond if beyond > out_of else out_of
@@ -170,21 +177,22 @@ def barycentric_on_triangles(rows: Floats, faces: NDArray[np.int32], points: Flo
         x, y, z = points[k, 0] - rows[f, 0], points[k, 1] - rows[f, 1], points[k, 2] - rows[f, 2]
         p = x * rows[f, 3] + y * rows[f, 4] + z * rows[f, 5]
         q = x * rows[f, 6] + y * rows[f, 7] + z * rows[f, 8]
-        s, t = 0.0, 0.0
+        second, third = 0.0, 0.0  # weights of corners 1 and 2
         if feature == 0:
-            t = q / (rows[f, 11] * rows[f, 12])
-            s = p / rows[f, 9] - rows[f, 10] * rows[f, 12] / rows[f, 9] * t
-            feature = 3 if s < 0.0 else 2 if s + t > 1.0 else 0  # beyond a side by rounding, which slivers magnify
+            third = q / (rows[f, 11] * rows[f, 12])
+            second = p / rows[f, 9] - rows[f, 10] * rows[f, 12] / rows[f, 9] * third
+            # beyond a side by rounding, which slivers magnify
+            feature = 3 if second < 0.0 else 2 if second + third > 1.0 else 0
         if feature == 1 or feature == 5:
-            s = p / rows[f, 9] if feature == 1 else 1.0
+            second = p / rows[f, 9] if feature == 1 else 1.0
         elif feature == 3 or feature == 6:
-            s, t = 0.0, (p * rows[f, 10] + q * rows[f, 11]) / rows[f, 12] if feature == 3 else 1.0
+            second, third = 0.0, (p * rows[f, 10] + q * rows[f, 11]) / rows[f, 12] if feature == 3 else 1.0
         elif feature == 2:
-            t = ((p - rows[f, 9]) * rows[f, 13] + q * rows[f, 14]) / rows[f, 15]
-            s = 1.0 - t
-        t = min(max(t, 0.0), 1.0)
-        s = min(max(s, 0.0), 1.0 - t)
-        weights[k, 0], weights[k, 1], weights[k, 2] = max(1.0 - s - t, 0.0), s, t
+            third = ((p - rows[f, 9]) * rows[f, 13] + q * rows[f, 14]) / rows[f, 15]
+            second = 1.0 - third
+        third = min(max(third, 0.0), 1.0)
+        second = min(max(second, 0.0), 1.0 - third)
+        weights[k, 0], weights[k, 1], weights[k, 2] = max(1.0 - second - third, 0.0), second, third
     return weights
 
 
@@ -238,7 +246,8 @@ def _descend(
 
     `discs` are those of `FaceTree.discs`, and `run` that of `nearest_faces`. Successive points descend together, as
     many as the work array `best` is long, which has their least squared distances so far. The compiler must not know
-    this number.
+    this number. A node is visited if one of these points may have something nearer in it. Loops over points have no
+    branches, so that the compiler vectorises them.
     """
     bounds, items = tree.bounds, tree.items
     out_faces, out_squares = np.empty(len(points), dtype=np.int32), np.empty(len(points))
@@ -252,6 +261,7 @@ def _descend(
             p = min(begin + k, len(points) - 1)
             coordinates[0, k], coordinates[1, k], coordinates[2, k] = points[p, 0], points[p, 1], points[p, 2]
             best[k], which[k], gaps[0, k] = np.inf, last, 0.0
+        # the face found last is measured before the root is visited, so that there is a bound on distances
         stack[0], depth, begun = 1, 1, begin % run == 0
         while depth > 0:
             node, first, end = np.int64(0), np.int64(0), np.int64(0)  # the range of faces to be measured
@@ -262,9 +272,10 @@ def _descend(
                     interested += 1 if gaps[depth, k] < best[k] else 0
                 if interested == 0:
                     continue
-            while 0 < node < leaves:
-                kept = 0
+            while 0 < node < leaves:  # down to a leaf, or to where nothing is near enough
+                kept = 0  # 1 if the first child may have something nearer, plus 2 if the second may
                 for side in range(2):
+                    # squared distances of the points from the box of the child
                     child, row = 2 * node + side, depth + side
                     ax, ay, az = bounds[child, 0], bounds[child, 1], bounds[child, 2]
                     bx, by, bz = bounds[child, 3], bounds[child, 4], bounds[child, 5]
@@ -280,6 +291,7 @@ def _descend(
                         square = dx * dx + dy * dy + dz * dz
                         gaps[row, k] = square
                         interested += 1 if square < best[k] else 0
+                    # its faces also lie in a disc, a flat cylinder, that may be farther away
                     if interested > 0 and discs[child, 7] >= 0.0:
                         ax, ay, az = discs[child, 0], discs[child, 1], discs[child, 2]
                         nx, ny, nz = discs[child, 3], discs[child, 4], discs[child, 5]
@@ -300,7 +312,7 @@ def _descend(
                             interested += 1 if square < best[k] else 0
                     kept += 1 + side if interested > 0 else 0
                 node = 2 * node + 1 if kept == 2 else 2 * node if kept > 0 else np.int64(0)
-                if kept == 3:  # first the one that is nearer to one of the points
+                if kept == 3:  # first the one that is nearer to the middle one of the points
                     if gaps[depth, middle] <= gaps[depth + 1, middle]:
                         for k in range(together):
                             gaps[depth, k] = gaps[depth + 1, k]

@@ -121,16 +121,16 @@ def _winding(corners: Floats, items: Ints, moments: Floats, points: Floats, thic
             node = stack[depth]
             dx, dy, dz = moments[node, 3] - x, moments[node, 4] - y, moments[node, 5] - z
             square = dx * dx + dy * dy + dz * dz
-            if square > moments[node, 6]:
+            if square > moments[node, 6]:  # far away: the formula of this module
                 m = moments[node]
                 xx, yy, zz = dx * dx, dy * dy, dz * dz
-                lean = xx * m[7] + yy * m[8] + zz * m[9] + dx * dy * m[10] + dx * dz * m[11] + dy * dz * m[12]
-                bend = dx * (xx * m[13] + yy * m[18] + zz * m[20]) + dy * (yy * m[14] + xx * m[16] + zz * m[21])
-                bend += dz * (zz * m[15] + xx * m[17] + yy * m[19]) + dx * dy * dz * m[22]
-                trace = dx * (3.0 * m[13] + m[18] + m[20]) + dy * (3.0 * m[14] + m[16] + m[21])
-                trace += dz * (3.0 * m[15] + m[17] + m[19])
+                m_of_d = xx * m[7] + yy * m[8] + zz * m[9] + dx * dy * m[10] + dx * dz * m[11] + dy * dz * m[12]
+                s_of_d = dx * (xx * m[13] + yy * m[18] + zz * m[20]) + dy * (yy * m[14] + xx * m[16] + zz * m[21])
+                s_of_d += dz * (zz * m[15] + xx * m[17] + yy * m[19]) + dx * dy * dz * m[22]
+                trace_of_s = dx * (3.0 * m[13] + m[18] + m[20]) + dy * (3.0 * m[14] + m[16] + m[21])
+                trace_of_s += dz * (3.0 * m[15] + m[17] + m[19])
                 flux = dx * m[0] + dy * m[1] + dz * m[2] + m[7] + m[8] + m[9]
-                flux += (7.5 * bend / square - 3.0 * lean - 1.5 * trace) / square
+                flux += (7.5 * s_of_d / square - 3.0 * m_of_d - 1.5 * trace_of_s) / square
                 total += flux / (square * np.sqrt(square))
             elif node < leaves:
                 stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
@@ -203,56 +203,57 @@ def _moments(triangles: Floats, tree: BoxTree) -> Floats:
     blocks = [
         _of_leaves(triangles, grouped[start : start + ROWS_PER_TASK]) for start in range(0, leaves, ROWS_PER_TASK)
     ]
-    vectors, weights, firsts, centres, first, second, radii = (
+    vectors, weights, weighted_centres, centres, moments_m, moments_s, radii = (
         np.concatenate(part, axis=-1) for part in zip(*blocks, strict=True)
     )
     moments = np.zeros((2 * leaves, 7 + len(SQUARES) + len(CUBES)))
     level = leaves
-    while True:
+    while True:  # level by level, from the leaves to the root
         rows = slice(level, 2 * level)
         low, high = tree.bounds[rows, :3].T, tree.bounds[rows, 3:].T
         with np.errstate(invalid="ignore"):  # for empty nodes
             box = np.linalg.norm(np.maximum(centres - low, high - centres), axis=0)
         radii = np.where(weights > 0, np.minimum(radii, box), 0.0)
         moments[rows, :3], moments[rows, 3:6], moments[rows, 6] = vectors.T, centres.T, (MOMENT_RADII * radii) ** 2
-        moments[rows, 7:13], moments[rows, 13:] = first.T, second.T
+        moments[rows, 7:13], moments[rows, 13:] = moments_m.T, moments_s.T
         if level == 1:
             return moments
+        # move the moments of both children to their common centre, and add them
         level //= 2
-        firsts, total = _of_pairs(firsts), _of_pairs(weights)
-        middle = _over(firsts, total)
-        moved = np.where(weights > 0, centres - np.repeat(middle, 2, axis=1), 0.0)
-        second = second + 2 * _product(first, moved) + _product(_product(vectors, moved), moved)
-        first = first + _product(vectors, moved)
-        radii = (radii + np.linalg.norm(moved, axis=0)).reshape(-1, 2).max(axis=1)
-        vectors, first, second = (_of_pairs(moment) for moment in (vectors, first, second))
-        centres, weights = middle, total
+        weighted_centres, weights_above = _of_pairs(weighted_centres), _of_pairs(weights)
+        centres_above = _over(weighted_centres, weights_above)
+        offsets = np.where(weights > 0, centres - np.repeat(centres_above, 2, axis=1), 0.0)
+        moments_s = moments_s + 2 * _product(moments_m, offsets) + _product(_product(vectors, offsets), offsets)
+        moments_m = moments_m + _product(vectors, offsets)
+        radii = (radii + np.linalg.norm(offsets, axis=0)).reshape(-1, 2).max(axis=1)
+        vectors, moments_m, moments_s = (_of_pairs(moment) for moment in (vectors, moments_m, moments_s))
+        centres, weights = centres_above, weights_above
 
 
 def _of_leaves(triangles: Floats, grouped: Ints) -> tuple[Floats, ...]:
     """Return moments of leaves, whose triangles are rows of `grouped`, −1 for none.
 
-    These are the sums of area vectors, of areas, and of areas times centroids, and then centres, M, S, and radii. The
-    last axis of each counts the leaves.
+    These are the sums of area vectors, of areas, and of areas times centroids, and then centres, coefficients of M and
+    S, and radii. The last axis of each counts the leaves.
     """
     filled = grouped >= 0
     corners = np.where(filled[..., None, None], triangles[grouped], 0.0)
     corners = np.ascontiguousarray(corners.transpose(2, 3, 0, 1))  # corner, axis, leaf, place in it
     middles = corners.mean(axis=0)
-    own = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0], axis=0)
-    areas = np.linalg.norm(own, axis=0)
-    vectors, weights, firsts = own.sum(axis=2), areas.sum(axis=1), (areas * middles).sum(axis=2)
+    own_vectors = 0.5 * np.cross(corners[1] - corners[0], corners[2] - corners[0], axis=0)
+    areas = np.linalg.norm(own_vectors, axis=0)
+    vectors, weights, firsts = own_vectors.sum(axis=2), areas.sum(axis=1), (areas * middles).sum(axis=2)
     centres = _over(firsts, weights)
     offsets = np.where(filled, middles - centres[..., None], 0.0)
-    linear = _product(own, offsets)
-    quadratic = _product(linear, offsets)
+    m_of_faces = _product(own_vectors, offsets)
+    s_of_faces = _product(m_of_faces, offsets)
     for corner in corners:  # the second moment of a triangle about its own centre
         arm = corner - middles
-        quadratic += _product(_product(own, arm), arm) / 12
-    first, second = linear.sum(axis=2), quadratic.sum(axis=2)
+        s_of_faces += _product(_product(own_vectors, arm), arm) / 12
+    moments_m, moments_s = m_of_faces.sum(axis=2), s_of_faces.sum(axis=2)
     reaches = np.where(filled, np.linalg.norm(corners - centres[..., None], axis=1), 0.0)
     radii = reaches.max(axis=(0, 2))
-    return vectors, weights, firsts, centres, first, second, radii
+    return vectors, weights, firsts, centres, moments_m, moments_s, radii
 
 
 def _product(form: Floats, line: Floats) -> Floats:
