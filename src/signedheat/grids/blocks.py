@@ -112,6 +112,7 @@ class BlockValues:
         rows = self.blocks.rows(low + np.indices(counts).reshape(3, -1).T)
         nodes = np.full((len(rows), BLOCK, BLOCK, BLOCK), np.nan, dtype=np.float32)
         nodes[rows >= 0] = self.values[rows[rows >= 0]]
+        # block and node in it along each axis, and then nodes along each axis
         by_axis = nodes.reshape(*counts, BLOCK, BLOCK, BLOCK).transpose(0, 3, 1, 4, 2, 5).reshape(BLOCK * counts)
         for axis, end in enumerate(self.shape - BLOCK * low):  # the last blocks reach beyond the grid
             np.moveaxis(by_axis, axis, 0)[max(end, 0) :] = np.nan
@@ -131,6 +132,7 @@ def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, li
         out[p] = np.nan
         if not (0.0 <= x <= limit[0] and 0.0 <= y <= limit[1] and 0.0 <= z <= limit[2]):
             continue
+        # the cell of the point, and the point in it
         i = min(np.int64(x), np.int64(limit[0]) - 1)
         j = min(np.int64(y), np.int64(limit[1]) - 1)
         k = min(np.int64(z), np.int64(limit[2]) - 1)
@@ -139,10 +141,10 @@ def _interpolate(tables: Tables, values: NDArray[np.float32], points: Floats, li
         for corner in range(8):
             a, b, c = corner >> 2 & 1, corner >> 1 & 1, corner & 1
             part = (f if a else 1.0 - f) * (g if b else 1.0 - g) * (h if c else 1.0 - h)
-            if part > 0.0:
-                u, v, w = (i + a) // BLOCK, (j + b) // BLOCK, (k + c) // BLOCK
-                cube = cubes[u // CUBE, v // CUBE, w // CUBE]
-                row = rows[cube, u % CUBE, v % CUBE, w % CUBE] if cube >= 0 else np.int32(-1)
+            if part > 0.0:  # as in `Blocks.rows`
+                block_i, block_j, block_k = (i + a) // BLOCK, (j + b) // BLOCK, (k + c) // BLOCK
+                cube = cubes[block_i // CUBE, block_j // CUBE, block_k // CUBE]
+                row = rows[cube, block_i % CUBE, block_j % CUBE, block_k % CUBE] if cube >= 0 else np.int32(-1)
                 if row < 0:
                     total = np.nan
                     break

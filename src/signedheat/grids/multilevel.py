@@ -127,8 +127,8 @@ def _diffuse_level(
     `factors` are those of `coarsening`, and `rounds` of `diffuse_multilevel`.
     """
     t = time(_mean_step(sources.steps))
-    real = sources.steps > 0
-    ratios = np.where(real, t / np.where(real, sources.steps, 1) ** 2, 0.0)
+    is_long = sources.steps > 0
+    ratios = np.where(is_long, t / np.where(is_long, sources.steps, 1) ** 2, 0.0)
     given_vectors, known = (None, None) if held is None else held
     start = sources.places >= 0 if known is None else known
     if last:
@@ -228,25 +228,26 @@ def _carry(
 
     `vectors` are (a, b, c, d, 4), known in the stretches of lines along the last axis where `inside` is true, and
     `coarse` has a node for every `factors`, (4,), nodes of these. The number of nodes known in each stretch of the
-    coarse grid is added to `counts`.
+    coarse grid is added to `counts`. Lengths are largest components.
     """
     n0, n1, n2, n3 = vectors.shape[:4]
+    # odd nodes are left out along axes that were halved
     for i in range(0, n0, 2 if factors[0] == 2 else 1):
         for j in range(0, n1, 2 if factors[1] == 2 else 1):
             for k in range(0, n2, 2 if factors[2] == 2 else 1):
-                a, b, c = i // factors[0], j // factors[1], k // factors[2]
-                for s in range(inside.shape[3]):
-                    if not inside[i, j, k, s]:
+                coarse_i, coarse_j, coarse_k = i // factors[0], j // factors[1], k // factors[2]
+                for stretch in range(inside.shape[3]):
+                    if not inside[i, j, k, stretch]:
                         continue
-                    for m in range(STRETCH * s, min(STRETCH * (s + 1), n3)):
-                        line, d = vectors[i, j, k, m], m // factors[3]
-                        size = max(max(abs(line[0]), abs(line[1])), max(abs(line[2]), abs(line[3])))
+                    for m in range(STRETCH * stretch, min(STRETCH * (stretch + 1), n3)):
+                        vector, coarse_m = vectors[i, j, k, m], m // factors[3]
+                        size = max(max(abs(vector[0]), abs(vector[1])), max(abs(vector[2]), abs(vector[3])))
                         if (m % 2 and factors[3] == 2) or size < LEAST_KNOWN:
                             continue
                         scale = size ** (power - np.float32(1))
-                        for q in range(4):
-                            coarse[a, b, c, d, q] = scale * line[q]
-                        counts[a, b, c, d // STRETCH] += 1
+                        for component in range(4):
+                            coarse[coarse_i, coarse_j, coarse_k, coarse_m, component] = scale * vector[component]
+                        counts[coarse_i, coarse_j, coarse_k, coarse_m // STRETCH] += 1
 
 
 @compiled
@@ -260,35 +261,36 @@ def _interpolate(
     one node.
     """
     _, n0, n1, n2, n = out.shape
-    row = np.empty(coarse.shape[4], dtype=np.float32)
+    mean = np.empty(coarse.shape[4], dtype=np.float32)
     for i in range(start if axis == 0 else 0, stop if axis == 0 else n0):
-        a = i // factors[0]
+        coarse_i = i // factors[0]
         for j in range(start if axis == 1 else 0, stop if axis == 1 else n1):
-            b = j // factors[1]
+            coarse_j = j // factors[1]
             for k in range(n2):
-                c = k // factors[2]
-                more0 = 1 + (1 if factors[0] == 2 and i % 2 else 0)
-                more1 = 1 + (1 if factors[1] == 2 and j % 2 else 0)
-                more2 = 1 + (1 if factors[2] == 2 and k % 2 else 0)
-                share = np.float32(1.0 / (more0 * more1 * more2))
-                for q in range(out.shape[0]):
-                    for m in range(row.shape[0]):
-                        row[m] = np.float32(0)
-                    for x in range(more0):
-                        for y in range(more1):
-                            for z in range(more2):
-                                line = coarse[q, a + x, b + y, c + z]
-                                for m in range(row.shape[0]):
-                                    row[m] += share * line[m]
-                    into = out[q, i, j, k]
+                coarse_k = k // factors[2]
+                n_i = 1 + (1 if factors[0] == 2 and i % 2 else 0)
+                n_j = 1 + (1 if factors[1] == 2 and j % 2 else 0)
+                n_k = 1 + (1 if factors[2] == 2 and k % 2 else 0)
+                share = np.float32(1.0 / (n_i * n_j * n_k))
+                # the mean of the one to eight coarse lines around this line, and then interpolation along it
+                for component in range(out.shape[0]):
+                    for m in range(mean.shape[0]):
+                        mean[m] = np.float32(0)
+                    for x in range(n_i):
+                        for y in range(n_j):
+                            for z in range(n_k):
+                                line = coarse[component, coarse_i + x, coarse_j + y, coarse_k + z]
+                                for m in range(mean.shape[0]):
+                                    mean[m] += share * line[m]
+                    into = out[component, i, j, k]
                     if factors[3] != 2:
                         for m in range(n):
-                            into[m] = row[m // factors[3]]
+                            into[m] = mean[m // factors[3]]
                     else:
                         for m in range((n + 1) // 2):
-                            into[2 * m] = row[m]
+                            into[2 * m] = mean[m]
                         for m in range(n // 2):
-                            into[2 * m + 1] = np.float32(0.5) * (row[m] + row[m + 1])
+                            into[2 * m + 1] = np.float32(0.5) * (mean[m] + mean[m + 1])
 
 
 def unit_vectors(
@@ -351,13 +353,13 @@ def sweep_lines(kernel: Callable[..., None], shape: tuple[int, ...], rounds: int
 
     Tiles on a diagonal are independent of each other, and run in threads.
     """
-    steps = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
+    ways = [(1, -1) if n > 1 else (1,) for n in shape[:3]]
     threads = 1 if np.prod(shape) < FEW_NODES else n_threads()
     size = [
         -(-n // parts) for n, parts in zip(shape[1:3], (threads, 4 * threads) if threads > 1 else (1, 1), strict=True)
     ]
     with ThreadPoolExecutor(max(1, threads - 1)) as others:
-        for direction in list(product(*steps)) * rounds:
+        for direction in list(product(*ways)) * rounds:
             for plane in range(shape[0])[:: direction[0]]:
                 for wave in wavefronts(shape[1:3], size, direction[1:]):
                     tiles = np.array([[plane, plane + direction[0], direction[0], *tile] for tile in wave])
@@ -390,7 +392,7 @@ def line_pivots(shape: tuple[int, ...], ratios: Floats) -> NDArray[np.float32]:
     Bit k of the row is set for lines at a wall of axis k. `ratios` are (4,) values of t / h².
     """
     n = shape[3]
-    along = np.full(n, 2.0)
+    along = np.full(n, 2.0)  # numbers of neighbours
     along[0] = along[-1] = 1.0
     table = np.empty((8, n))
     for walls in range(8):
@@ -418,13 +420,15 @@ def _sweep_tiles(
     Lines run along the last of the four axes, with n nodes in stretches of `STRETCH`. `vectors`, (lines, 4 n), are X,
     which is solved for in stretches that are `active`, (lines, stretches). `places`, (lines, stretches), are the row of
     the source vectors of each stretch in `sums`, (r, 4 · `STRETCH`), or −1. `ratios` are a along the four axes,
-    `pivots` those of `line_pivots`, and rows of `tiles`, (t, 9), start, stop and step along the first three axes. Four
-    components are updated at once; slices of lines help the compiler to vectorise.
+    `pivots` those of `line_pivots`, and rows of `tiles`, (t, 9), start, stop and step along the first three axes.
+
+    Active stretches that follow each other on a line are a tridiagonal system, which is solved by the Thomas algorithm
+    for all four components at once. Slices of lines help the compiler to vectorise.
     """
     n0, n1, n2, n = shape
     ratio0, ratio1, ratio2, along = ratios
     scratch = np.empty(4 * n, dtype=np.float32)
-    none = np.zeros(4 * n, dtype=np.float32)  # neighbours beyond the walls
+    beyond = np.zeros(4 * n, dtype=np.float32)  # neighbours beyond the walls
     stretches = active.shape[1]
     for tile in tiles:
         for i in range(tile[0], tile[1], tile[2]):
@@ -432,66 +436,67 @@ def _sweep_tiles(
                 for k in range(tile[6], tile[7], tile[8]):
                     line_id = (i * n1 + j) * n2 + k
                     walls = (i == 0 or i == n0 - 1) + 2 * (j == 0 or j == n1 - 1) + 4 * (k == 0 or k == n2 - 1)
-                    stretch = 0
-                    while stretch < stretches:
-                        if not active[line_id, stretch]:
-                            stretch += 1
+                    end_stretch = 0
+                    while end_stretch < stretches:
+                        if not active[line_id, end_stretch]:
+                            end_stretch += 1
                             continue
-                        first = stretch
-                        while stretch < stretches and active[line_id, stretch]:
-                            stretch += 1
-                        begin, end = first * STRETCH, min(stretch * STRETCH, n)
-                        part = slice(4 * begin, 4 * end)
-                        inflow, out = scratch[: 4 * (end - begin)], vectors[line_id, part]
-                        pivot = pivots[walls, begin:end]
-                        # inflow from neighbouring lines, the source, and fixed values on the line itself
-                        low = vectors[line_id - n2, part] if j > 0 else none[part]
-                        high = vectors[line_id + n2, part] if j < n1 - 1 else none[part]
-                        left = vectors[line_id - 1, part] if k > 0 else none[part]
-                        right = vectors[line_id + 1, part] if k < n2 - 1 else none[part]
-                        for m in range(len(inflow)):
-                            inflow[m] = ratio1 * (low[m] + high[m]) + ratio2 * (left[m] + right[m])
+                        first_stretch = end_stretch
+                        while end_stretch < stretches and active[line_id, end_stretch]:
+                            end_stretch += 1
+                        begin, end = first_stretch * STRETCH, min(end_stretch * STRETCH, n)
+                        window = slice(4 * begin, 4 * end)
+                        values, line = scratch[: 4 * (end - begin)], vectors[line_id, window]
+                        pivots_here = pivots[walls, begin:end]
+                        # right side: the neighbouring lines, the source, and fixed values on the line itself
+                        before_j = vectors[line_id - n2, window] if j > 0 else beyond[window]
+                        after_j = vectors[line_id + n2, window] if j < n1 - 1 else beyond[window]
+                        before_k = vectors[line_id - 1, window] if k > 0 else beyond[window]
+                        after_k = vectors[line_id + 1, window] if k < n2 - 1 else beyond[window]
+                        for m in range(len(values)):
+                            values[m] = ratio1 * (before_j[m] + after_j[m]) + ratio2 * (before_k[m] + after_k[m])
                         if n0 > 1:
-                            below = vectors[line_id - n1 * n2, part] if i > 0 else none[part]
-                            above = vectors[line_id + n1 * n2, part] if i < n0 - 1 else none[part]
-                            for m in range(len(inflow)):
-                                inflow[m] += ratio0 * (below[m] + above[m])
-                        for s in range(first, stretch):
-                            row = places[line_id, s]
+                            before_i = vectors[line_id - n1 * n2, window] if i > 0 else beyond[window]
+                            after_i = vectors[line_id + n1 * n2, window] if i < n0 - 1 else beyond[window]
+                            for m in range(len(values)):
+                                values[m] += ratio0 * (before_i[m] + after_i[m])
+                        for stretch in range(first_stretch, end_stretch):
+                            row = places[line_id, stretch]
                             if row >= 0:
-                                into = inflow[4 * STRETCH * (s - first) :]
+                                into = values[4 * STRETCH * (stretch - first_stretch) :]
                                 for m in range(min(len(into), 4 * STRETCH)):
                                     into[m] += sums[row, m]
                         x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
                         if begin > 0:  # the previous node has been eliminated: its value is x + q · (value here)
-                            before = vectors[line_id, 4 * begin - 4 : 4 * begin]
+                            previous = vectors[line_id, 4 * begin - 4 : 4 * begin]
                             q = along * pivots[walls, begin - 1]
-                            x, y = before[0] - q * out[0], before[1] - q * out[1]
-                            z, w = before[2] - q * out[2], before[3] - q * out[3]
+                            x, y = previous[0] - q * line[0], previous[1] - q * line[1]
+                            z, w = previous[2] - q * line[2], previous[3] - q * line[3]
                         if end < n:
                             for c in range(4):
-                                inflow[4 * (end - begin) - 4 + c] += along * vectors[line_id, 4 * end + c]
-                        # forward elimination and back substitution
+                                values[4 * (end - begin) - 4 + c] += along * vectors[line_id, 4 * end + c]
+                        # forward elimination, which leaves the values of each node without those after it
                         for m in range(end - begin):
-                            p = pivot[m]
-                            q = along * p
-                            x = p * inflow[4 * m] + q * x
-                            y = p * inflow[4 * m + 1] + q * y
-                            z = p * inflow[4 * m + 2] + q * z
-                            w = p * inflow[4 * m + 3] + q * w
-                            inflow[4 * m] = x
-                            inflow[4 * m + 1] = y
-                            inflow[4 * m + 2] = z
-                            inflow[4 * m + 3] = w
+                            pivot = pivots_here[m]
+                            q = along * pivot
+                            x = pivot * values[4 * m] + q * x
+                            y = pivot * values[4 * m + 1] + q * y
+                            z = pivot * values[4 * m + 2] + q * z
+                            w = pivot * values[4 * m + 3] + q * w
+                            values[4 * m] = x
+                            values[4 * m + 1] = y
+                            values[4 * m + 2] = z
+                            values[4 * m + 3] = w
+                        # back substitution
                         x, y, z, w = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
                         for back in range(end - begin):
                             m = end - begin - 1 - back
-                            q = along * pivot[m]
-                            x = inflow[4 * m] + q * x
-                            y = inflow[4 * m + 1] + q * y
-                            z = inflow[4 * m + 2] + q * z
-                            w = inflow[4 * m + 3] + q * w
-                            out[4 * m] = x
-                            out[4 * m + 1] = y
-                            out[4 * m + 2] = z
-                            out[4 * m + 3] = w
+                            q = along * pivots_here[m]
+                            x = values[4 * m] + q * x
+                            y = values[4 * m + 1] + q * y
+                            z = values[4 * m + 2] + q * z
+                            w = values[4 * m + 3] + q * w
+                            line[4 * m] = x
+                            line[4 * m + 1] = y
+                            line[4 * m + 2] = z
+                            line[4 * m + 3] = w

@@ -185,10 +185,12 @@ def _divide(
     """Write the faces that can be nearest in each of eight boxes with half widths `half`, (3,), to `out`, (8, f).
 
     Their numbers are written to `counts`, (8,). `away`, `least_squares` and `nearest` are what `_nearest` found for the
-    centres of the boxes. The bound holds since squared distance lies above its tangent planes.
+    centres of the boxes. Let v be the vector to a centre from its foot on a candidate, and w from that on the face
+    nearest to it. At the centre plus e, squared distances are at least ``|v|² + 2 v·e`` and at most ``|w + e|²``. So a
+    candidate is nearest nowhere in the box if ``|v|² − 2 Σ half |v − w|`` exceeds ``|w|² + |half|²``.
     """
     # (4, 8): the square that a candidate must not exceed, and the vectors of the faces nearest to the centres
-    to_beat, can = np.empty((4, len(nearest))), np.empty(len(nearest), dtype=np.int64)
+    to_beat, is_candidate = np.empty((4, len(nearest))), np.empty(len(nearest), dtype=np.int64)
     for e in range(len(nearest)):
         counts[e] = 0
         for d in range(4):
@@ -202,12 +204,12 @@ def _divide(
         for e in range(len(nearest)):
             low = away[k, 0, e] - a * abs(away[k, 1, e] - to_beat[1, e])
             low -= b * abs(away[k, 2, e] - to_beat[2, e]) + c * abs(away[k, 3, e] - to_beat[3, e])
-            can[e] = 1 if low <= to_beat[0, e] else 0
-            total += can[e]
+            is_candidate[e] = 1 if low <= to_beat[0, e] else 0
+            total += is_candidate[e]
         if total > 0:
             for e in range(len(nearest)):
                 out[e, counts[e]] = faces[k]
-                counts[e] += can[e]
+                counts[e] += is_candidate[e]
 
 
 @compiled

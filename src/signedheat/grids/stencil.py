@@ -125,8 +125,11 @@ def _divide(eigenvalues: list[Floats], transformed: Floats, axis: int, start: in
 def _divergence(
     components: NDArray[np.floating], scales: Floats, out: Floats, axis: int, start: int, stop: int
 ) -> None:
-    """Write −∇·Y in a slab of `out`; `scales` are 1 / (2 h) along each axis of the grid."""
-    low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])
+    """Write −∇·Y in a slab of `out`; `scales` are 1 / (2 h) along each axis of the grid.
+
+    `components` are (d, *out.shape), those of Y. At a node that is at no wall, fluxes add up to a central difference.
+    """
+    low, high = max(start - 1, 0), min(stop + 1, out.shape[axis])  # with a layer of neighbours on both sides
     around = np.moveaxis(np.moveaxis(components, axis + 1, 0)[low:high], 0, axis + 1)
     sums = np.zeros(around.shape[1:])
     for component, scale, along in zip(around, scales, range(4 - len(scales), 4), strict=True):

@@ -241,17 +241,9 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
         nx, ny, nz = 0.0, 0.0, 0.0
         for at in range(begin, begin + n_items):
             if items[at] >= 0:
-                face = items[at]
-                ax, ay, az = (
-                    corners[face, 3] - corners[face, 0],
-                    corners[face, 4] - corners[face, 1],
-                    corners[face, 5] - corners[face, 2],
-                )
-                bx, by, bz = (
-                    corners[face, 6] - corners[face, 0],
-                    corners[face, 7] - corners[face, 1],
-                    corners[face, 8] - corners[face, 2],
-                )
+                f = items[at]
+                ax, ay, az = corners[f, 3] - corners[f, 0], corners[f, 4] - corners[f, 1], corners[f, 5] - corners[f, 2]
+                bx, by, bz = corners[f, 6] - corners[f, 0], corners[f, 7] - corners[f, 1], corners[f, 8] - corners[f, 2]
                 nx, ny, nz = nx + ay * bz - az * by, ny + az * bx - ax * bz, nz + ax * by - ay * bx
         length = np.sqrt(nx * nx + ny * ny + nz * nz)
         if not length > 0.0:
@@ -262,12 +254,8 @@ def _discs(corners: Floats, tree: BoxTree) -> Floats:
         square, low, high = 0.0, np.inf, -np.inf  # squared radius, and lowest and highest corner along the normal
         for at in range(begin, begin + n_items):
             if items[at] >= 0:
-                for column in range(0, 9, 3):
-                    ax, ay, az = (
-                        corners[items[at], column] - x,
-                        corners[items[at], column + 1] - y,
-                        corners[items[at], column + 2] - z,
-                    )
+                for c in range(0, 9, 3):
+                    ax, ay, az = corners[items[at], c] - x, corners[items[at], c + 1] - y, corners[items[at], c + 2] - z
                     along = ax * nx + ay * ny + az * nz
                     low, high = min(low, along), max(high, along)
                     square = max(square, ax * ax + ay * ay + az * az - along * along)
