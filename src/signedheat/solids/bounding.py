@@ -247,33 +247,24 @@ def _decided(
     the outside and the inside of one body.
     """
     counts, pieces, orientable, whole = reading.counts, reading.pieces, reading.orientable, reading.whole
+    # (p,) pieces with open edges or with triangles that do not count are open
     n = len(orientable)
-    idle = np.bincount(pieces, counts == 0, n) > 0
-    open_pieces = (chain.open_edges(counts, pieces) > 0) | (idle & (np.bincount(pieces, whole, n) == 0))
-    closed = ~open_pieces & orientable
+    has_idle = np.bincount(pieces, counts == 0, n) > 0
+    is_open = (chain.open_edges(counts, pieces) > 0) | (has_idle & (np.bincount(pieces, whole, n) == 0))
+    closed = ~is_open & orientable
     flips, levels, loose, bounds = np.ones(n), np.full(n, 0.5), np.full(n, -1), closed.copy()
-    open_faces, overlapping = np.flatnonzero((open_pieces & orientable)[pieces] & (counts != 0)), False
+    open_faces, overlapping = np.flatnonzero((is_open & orientable)[pieces] & (counts != 0)), False
     if len(open_faces):
-        names, labels = np.unique(pieces[open_faces], return_inverse=True)
-        triangles = directed(chain.triangles[open_faces], np.sign(counts[open_faces]))
-        edges, owners = open_edges(chain.faces[open_faces], labels)
-        groups = connected_pieces(chain, open_faces, labels, edges, owners)
-        ends = chain.positions[edges]
-        rims = Rims(ends.mean(axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), owners)
         around = np.zeros((0, 3, 3))
         if closed.any() and not as_oriented:
             facing = _nested(chain, pieces, counts * closed[pieces], closed, flips, nested)[0]
             around = directed(chain.triangles, counts * (closed * facing)[pieces])
-        given = sums_of(
-            np.sign(counts[open_faces] * chain.multiplicities[open_faces]) * chain.areas[open_faces], labels, len(names)
-        )
-        fixed_pieces = np.bincount(labels, fixed[open_faces]) > 0
-        parts = Pieces(triangles, labels)
-        found = open_bounding(
-            OpenPieces(parts, clusters_of(parts), groups, rims, given, fixed_pieces), around, nested, united
-        )
+        names, labels = np.unique(pieces[open_faces], return_inverse=True)
+        open_pieces = _open_pieces(chain, counts, fixed, open_faces, labels)
+        found = open_bounding(open_pieces, around, nested, united)
         bounds[names], loose[names], levels[names], overlapping = found.bounds, found.loose, found.levels, found.overlap
         flips[names] = np.where(bounds[names], found.signs, 1.0)
+    # closed pieces once more, since they may lie within open ones
     bodies = inwards = 0
     if closed.any() and not as_oriented:
         flips, bodies, inwards = _nested(chain, pieces, counts * bounds[pieces], closed, flips, nested)
@@ -281,6 +272,7 @@ def _decided(
         along = _along_closed(chain, pieces, loose, counts * flips[pieces] * closed[pieces])
         bounds &= ~along
         loose[along] = -1
+    # from pieces to triangles
     turned = reading.turned != (flips[pieces] < 0)
     final = (counts * flips[pieces] * bounds[pieces]).astype(np.int64)
     with_copies = (
@@ -308,6 +300,26 @@ def _decided(
     )
 
 
+def _open_pieces(chain: Chain, counts: Ints, fixed: Bools, faces: Ints, labels: Ints) -> OpenPieces:
+    """Gather what decides about open pieces, which consist of the (k,) `faces`; `labels`, (k,), are their pieces.
+
+    `counts`, (m,), say how often triangles count, and `fixed`, (m,), which are not flipped.
+    """
+    pieces = Pieces(directed(chain.triangles[faces], np.sign(counts[faces])), labels)
+    edges, owners = open_edges(chain.faces[faces], labels)
+    ends = chain.positions[edges]
+    rims = Rims(ends.mean(axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), owners)
+    as_given = np.sign(counts[faces] * chain.multiplicities[faces]) * chain.areas[faces]
+    return OpenPieces(
+        pieces,
+        clusters_of(pieces),
+        connected_pieces(chain, faces, labels, edges, owners),
+        rims,
+        given=sums_of(as_given, labels, len(pieces.areas)),
+        fixed=np.bincount(labels, fixed[faces]) > 0,
+    )
+
+
 def _nested(
     chain: Chain, pieces: Ints, counts: Ints, closed: Bools, flips: Floats, nested: Nesting
 ) -> tuple[Floats, int, int]:
@@ -316,6 +328,7 @@ def _nested(
     Outermost pieces face outwards. Those within others face as `nested` says: with "given" as they were given relative
     to the outermost body, or by depth if that is unclear. Pieces that are not `closed` keep their signs `flips`.
     """
+    # all closed pieces outwards
     n = len(closed)
     counted = np.flatnonzero(counts != 0)
     triangles, owners = chain.triangles[counted], pieces[counted]
@@ -323,6 +336,7 @@ def _nested(
     outward = np.where(closed, np.where(volumes >= 0, 1.0, -1.0), flips)
     if len(np.unique(owners)) == 1:
         return outward, 0, 0
+    # depth: the number of other pieces around a piece, the least at its sample points
     names, labels = np.unique(owners, return_inverse=True)
     faces, points = sampled(Pieces(triangles, labels), 16 * len(names))
     probes, own = owners[faces], np.abs(counts[counted[faces]])
@@ -334,6 +348,7 @@ def _nested(
     inner = closed & (depth > 0)
     if not inner.any() or not (depth[owners] <= 0).any():  # of copies a rounding apart, each may lie within the other
         return outward, 0, 0
+    # how each inner piece was given, relative to the outermost piece around it
     given = np.bincount(pieces, np.sign(counts) * np.sign(chain.multiplicities) * chain.areas, n)
     clear = np.abs(given) >= HINT * np.bincount(pieces, chain.areas, n)
     given_sign = np.where(given >= 0, 1.0, -1.0)
@@ -407,15 +422,16 @@ def open_bounding(given: OpenPieces, closed: Floats, nested: Nesting = "given", 
 def _open_bounding(open_pieces: OpenPieces, soup: bool, closed: Floats, nested: Nesting, united: bool) -> OpenBounding:
     """Decide about open pieces as `open_bounding` does; each triangle is a dipole if they are a `soup`, or too many.
 
-    In each round, pieces whose level is too low are left out if they leave at least half as much unexplained as the
-    worst one.
+    Weights orient the pieces, and levels tell which of them bound something. In each round, pieces whose level is too
+    low are left out if they leave at least half as much unexplained as the worst one; then the weights are solved for
+    again. How high a level must be depends on what a piece belongs to: a body by itself, or a cluster of loose pieces.
     """
     pieces, clusters, groups, rims, given, fixed = open_pieces
     n, areas = len(pieces.areas), pieces.areas
-    shared = np.bincount(groups, minlength=n)[groups] > 1
+    in_groups = np.bincount(groups, minlength=n)[groups] > 1
     alone = np.abs(levels_of_pieces(pieces))
     whole = Dipoles.of_triangles(pieces) if soup or n > MOST_EXACT else Matrix.of(pieces)
-    members = _effective_counts(areas, np.arange(n), groups)[groups]
+    group_sizes = _effective_counts(areas, np.arange(n), groups)[groups]
     overlapping = False
     alive, weights = np.ones(n, dtype=bool), np.ones(n)  # the signs of the weights are those of the pieces
     if not fixed.all():
@@ -430,24 +446,25 @@ def _open_bounding(open_pieces: OpenPieces, soup: bool, closed: Floats, nested: 
         whole = replace(whole, within=-around)
     while alive.any():
         names, system = np.flatnonzero(alive), whole.chosen(alive)
-        signs = signs_of(weights[names])
+        signs, owners = signs_of(weights[names]), names[system.owners]  # (s,) piece of each sample
+        # (s,) levels at samples, and (n,) of pieces; fixed ones within bodies have 1½, 2½, …, which count as ½
         values = system.levels(signs)
-        held = fixed[names[system.owners]] & (values > 0.5)  # as given, what lies within a body bounds as little
-        values[held] = 0.5 - np.abs(values[held] - np.floor(values[held]) - 0.5)
-        rows, levels = names[system.owners], np.zeros(n)
+        within_body = fixed[owners] & (values > 0.5)
+        values[within_body] = 0.5 - np.abs(values[within_body] - np.floor(values[within_body]) - 0.5)
+        levels = np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
-        # whether groups are bodies by themselves; loose pieces are judged cluster by cluster
-        within = system.levels_within(signs, groups[names])
-        together, spread = (means(each, groups[rows], system.areas, n)[groups] for each in (within, within**2))
-        together = np.where(shared & _is_body(together, spread, members), together, 0.0)
-        by_itself = np.maximum(alone, together)
+        # which pieces are bodies by themselves, alone or with their group
+        in_group = system.levels_within(signs, groups[names])
+        mean, square = (means(each, groups[owners], system.areas, n)[groups] for each in (in_group, in_group**2))
+        of_group = np.where(in_groups & _is_body(mean, square, group_sizes), mean, 0.0)
+        by_itself = np.maximum(alone, of_group)
         own = by_itself >= SHEET
+        # all others are loose: which of their clusters are bodies
         loose = alive & ~own
-        shares = np.where(loose[rows], system.areas, 0.0)
-        mean = means(values, clusters[rows], shares, n)
-        square = means(values**2, clusters[rows], shares, n)
-        amount = _effective_counts(areas * loose, groups, clusters)
-        body = _is_body(mean, square, amount)
+        loose_areas = np.where(loose[owners], system.areas, 0.0)
+        mean, square = (means(each, clusters[owners], loose_areas, n) for each in (values, values**2))
+        body = _is_body(mean, square, _effective_counts(areas * loose, groups, clusters))
+        # leave out those whose level is too low, the worst first
         thresholds = np.minimum(SHEET, 2 * SHEET * mean) if isinstance(system, Matrix) else -np.inf  # dipoles are noisy
         least = np.where(body, thresholds, np.inf)[clusters]
         wrong = alive & (levels < np.where(loose, least, SHEET * np.minimum(1.0, 2.0 * by_itself)))
@@ -457,14 +474,17 @@ def _open_bounding(open_pieces: OpenPieces, soup: bool, closed: Floats, nested: 
         alive &= ~(wrong & (unexplained >= 0.5 * unexplained.max()))
         if alive.any() and not fixed[alive].all():
             weights[alive] = whole.chosen(alive).weights(fixed[alive], weights[alive])
-    of_loose, of_bodies = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
-    mostly = alive & (of_loose > of_bodies)[clusters]
-    levels = np.where(mostly, mean[clusters], 0.5)
-    return OpenBounding(signs_of(weights), alive, np.where(mostly, clusters, -1), levels, overlapping)
+    area_loose, area_own = (np.bincount(clusters, areas * (alive & mask), n) for mask in (~own, own))
+    mostly_loose = alive & (area_loose > area_own)[clusters]
+    levels = np.where(mostly_loose, mean[clusters], 0.5)
+    return OpenBounding(signs_of(weights), alive, np.where(mostly_loose, clusters, -1), levels, overlapping)
 
 
 def _is_body(mean: Floats, square: Floats, pieces: Floats) -> Bools:
-    """(n,) whether levels are those of a body, given their means, mean squares and the numbers of pieces, (n,) each."""
+    """(n,) whether levels are those of a body, given their means, mean squares and the numbers of pieces, (n,) each.
+
+    The mean must exceed what chance explains, and the levels must be nearly the same.
+    """
     return (mean * np.sqrt(pieces + 1) >= CHANCE_LEVEL) & (mean**2 >= COHERENT_LEVELS * square)
 
 

@@ -125,19 +125,21 @@ class Matrix:
     def of(cls, pieces: Pieces) -> Matrix:
         """Sample points on the pieces, and compute the winding number of each piece there."""
         faces, points = sampled(pieces, min(LEVEL_POINTS, 5_000_000 // len(pieces.areas)))  # limits the size of W
+        # triangles piece by piece, where each piece starts, and the place of each given triangle
         order = np.argsort(pieces.labels, kind="stable")
         starts = np.concatenate([[0], np.cumsum(np.bincount(pieces.labels))])
         triangles = pieces.triangles[order]
         rank = np.empty(len(order), dtype=np.int64)
         rank[order] = np.arange(len(order))
+        # pieces as dipoles: area vector, centre and radius of each
         k, owners = len(pieces.areas), pieces.labels[faces]
         vectors = sums_of(area_vectors(pieces.triangles), pieces.labels, k)
         centres = sums_of(pieces.triangles.mean(axis=1) * pieces.face_areas[:, None], pieces.labels, k)
         centres /= np.maximum(pieces.areas, np.finfo(float).tiny)[:, None]
-        reaches = np.zeros(k)
-        off = np.linalg.norm(pieces.triangles - centres[pieces.labels][:, None], axis=2).max(axis=1)
-        np.maximum.at(reaches, pieces.labels, off)
-        matrix, balls = np.zeros((len(points), k)), np.c_[centres, reaches]
+        radii = np.zeros(k)
+        reaches = np.linalg.norm(pieces.triangles - centres[pieces.labels][:, None], axis=2).max(axis=1)
+        np.maximum.at(radii, pieces.labels, reaches)
+        matrix, balls = np.zeros((len(points), k)), np.c_[centres, radii]
         corners = np.ascontiguousarray(triangles).reshape(-1, 9)
         _small_pieces(corners, starts, vectors, balls, points, rank[faces], matrix)
         for piece in np.flatnonzero(np.diff(starts) > TREE_FACES):
@@ -166,7 +168,7 @@ class Matrix:
         """
         shares = self.areas / max(self.areas.sum(), np.finfo(float).tiny)
         unknowns, k = together(fixed), self.matrix.shape[1]
-        sums = sparse.csr_array((np.ones(k), (np.arange(k), unknowns)))
+        sums = sparse.csr_array((np.ones(k), (np.arange(k), unknowns)))  # (k, unknowns): weights from the unknowns
         weighted = self.matrix * shares[:, None]
         normal = weighted.T @ self.matrix
         normal += agreement(links_of(self.points, self.normals, self.owners), shares, self.owners).toarray()
@@ -217,31 +219,47 @@ def sampled(pieces: Pieces, count: int) -> tuple[Ints, Floats]:
 
     There is one on each piece, and about `count` more: half of them are shared out by area, half evenly.
     """
-    areas, k = pieces.face_areas, len(pieces.areas)
-    order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
     shares = pieces.areas / max(pieces.areas.sum(), np.finfo(float).tiny)
-    numbers = 1 + np.floor(0.5 * count * (shares + 1 / k)).astype(np.int64)
+    numbers = 1 + np.floor(0.5 * count * (shares + 1 / len(shares))).astype(np.int64)
+    faces = _faces_drawn(pieces, numbers)
+    # points on one face, which follow each other, are spread over it by Roberts's sequence R₂, from its centre on; it
+    # is folded from the parallelogram of the sides into the triangle
+    same = np.concatenate([[False], faces[1:] == faces[:-1]])
+    place = np.arange(len(faces)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(faces))))
+    u, v = (1 / 3 + place * 0.7548776662466927) % 1.0, (1 / 3 + place * 0.5698402909980532) % 1.0
+    beyond = u + v > 1
+    u, v = np.where(beyond, 1 - u, u), np.where(beyond, 1 - v, v)
+    a, b, c = _corners_in_order(pieces.triangles[faces])
+    return faces, a + u[:, None] * (b - a) + v[:, None] * (c - a)
+
+
+def _faces_drawn(pieces: Pieces, numbers: Ints) -> Ints:
+    """(n,) faces for points on pieces, piece by piece; `numbers`, (k,), are those of the points.
+
+    The faces of a piece follow each other along a space-filling curve, each over a length that is its area. The points
+    are at equal distances on this line.
+    """
+    order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
     owners, number = numbered(numbers)
-    share = (number + 0.5) / numbers[owners]
-    ends = np.cumsum(areas[order])
-    lasts = np.cumsum(np.bincount(pieces.labels, minlength=k)) - 1
+    share = (number + 0.5) / numbers[owners]  # of the area of the piece that comes before the point
+    ends = np.cumsum(pieces.face_areas[order])
+    lasts = np.cumsum(np.bincount(pieces.labels, minlength=len(numbers))) - 1
+    firsts = np.concatenate([[0], lasts[:-1] + 1])
     begins = np.concatenate([[0.0], ends[lasts[:-1]]])
     rows = np.searchsorted(ends, begins[owners] + share * (ends[lasts] - begins)[owners])
-    firsts = np.concatenate([[0], lasts[:-1] + 1])
-    faces = order[np.clip(rows, firsts[owners], lasts[owners])]
-    # several points on one face are spread over it; a single one is at its centre
-    same = np.concatenate([[False], faces[1:] == faces[:-1]])
-    run = np.arange(len(faces)) - np.maximum.accumulate(np.where(same, 0, np.arange(len(faces))))
-    u, v = (1 / 3 + run * 0.7548776662466927) % 1.0, (1 / 3 + run * 0.5698402909980532) % 1.0
-    fold = u + v > 1
-    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
-    # corners in an order that is the same however they are given: by opposite sides' lengths, then by position
-    corners = pieces.triangles[faces]
-    across = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2)
-    across = np.round(across / np.maximum(across.max(axis=1, keepdims=True), np.finfo(float).tiny), 9)
-    x, y, z = corners.transpose(2, 0, 1)
-    a, b, c = np.take_along_axis(corners, np.lexsort((z, y, x, across), axis=1)[..., None], axis=1).transpose(1, 0, 2)
-    return faces, a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return order[np.clip(rows, firsts[owners], lasts[owners])]
+
+
+def _corners_in_order(triangles: Floats) -> Floats:
+    """(3, n, 3) corners of (n, 3, 3) triangles in an order that does not depend on how they are given.
+
+    They are sorted by the length of the opposite side, and by position where sides are equal up to rounding.
+    """
+    opposite = np.linalg.norm(np.roll(triangles, -1, axis=1) - np.roll(triangles, 1, axis=1), axis=2)
+    opposite = np.round(opposite / np.maximum(opposite.max(axis=1, keepdims=True), np.finfo(float).tiny), 9)
+    x, y, z = triangles.transpose(2, 0, 1)
+    order = np.lexsort((z, y, x, opposite), axis=1)
+    return np.take_along_axis(triangles, order[..., None], axis=1).transpose(1, 0, 2)
 
 
 @compiled
@@ -423,7 +441,7 @@ class Dipoles:
         filled = self.tree.items >= 0
         np.add.at(sums, leaves + np.flatnonzero(filled) // BOXES_PER_LEAF, values[self.tree.items[filled]])
         level = leaves
-        while level > 1:
+        while level > 1:  # nodes of a level are as many as its first number; node k has the children 2 k and 2 k + 1
             sums[level // 2 : level] = sums[level : 2 * level].reshape(-1, 2, values.shape[1]).sum(axis=1)
             level //= 2
         return sums
