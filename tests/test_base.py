@@ -13,7 +13,7 @@ from signedheat.arrays import Frozen, LastUsed, ShortRepr, fingerprint, short
 from signedheat.batches.inputs import _without_extension
 from signedheat.batches.pool import duration
 from signedheat.errors import MissingPackageError, SignedHeatError
-from signedheat.jobs import command_for, run_cancellable, run_limited, within
+from signedheat.jobs import command_for, part_of_work, report, reporting, run_cancellable, run_limited
 from signedheat.memory import fitting_count, untouched_zeros
 from signedheat.methods import LinearElements
 from signedheat.packages import ensure_installed, missing_package, require
@@ -59,7 +59,7 @@ def test_reports_count_defects():
 
 
 def test_jobs_return_their_results():
-    assert run_cancellable(lambda: 6 * 7, lambda: None) == 42
+    assert run_cancellable(lambda: 6 * 7) == 42
     assert run_limited(lambda: 6 * 7, 10.0) == 42
     printed = subprocess.run(command_for("builtins:print", "a b"), capture_output=True, check=True).stdout
     assert printed.decode().strip() == "a b"
@@ -106,8 +106,11 @@ def test_an_address_without_a_scheduler_is_refused():
 
 def test_progress_of_a_part():
     seen = []
-    within(lambda fraction, step: seen.append(fraction), 0.5, 1.0)(0.5, "halfway")
-    assert seen == [0.75]
+    with reporting(lambda fraction, step: seen.append(fraction)):
+        with part_of_work(0.5, 1.0):
+            report(0.5, "halfway")
+        report(0.5, "not back")
+    assert seen == [0.75, 0.75, 1.0]
 
 
 def test_short_texts():

@@ -15,7 +15,7 @@ import scipy.spatial
 from fuzz.cases_interrupts import LATEST, LONG_CALLS, ended
 from fuzz.frame import families, run_case
 from signedheat.compiled import compiled
-from signedheat.jobs import Abandoned, briefly, interruptible, own_flag, run_cancellable, start_thread
+from signedheat.jobs import Abandoned, briefly, interruptible, own_flag, run_watched, start_thread
 from signedheat.parallel import PointTree, in_chunks, in_threads
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
@@ -124,7 +124,7 @@ def test_a_job_that_nobody_waits_for_ends_at_its_next_kernel():
         raise ValueError
 
     with pytest.raises(ValueError):
-        run_cancellable(job, report)
+        run_watched(job, report)
     deadline = time.monotonic() + 5
     while not seen and time.monotonic() < deadline:
         time.sleep(0.01)

@@ -12,7 +12,7 @@ import signedheat as sh
 from refusals import refused
 from shapes.grid_cases import box, sphere
 from signedheat import parallel, samples
-from signedheat.jobs import run_cancellable
+from signedheat.jobs import reporting, run_cancellable, run_watched
 
 
 class Stop(Exception):
@@ -26,7 +26,7 @@ def stop():
 def test_what_the_report_raises_ends_the_wait():
     begin = time.perf_counter()
     with pytest.raises(Stop):
-        run_cancellable(lambda: time.sleep(20), stop)
+        run_watched(lambda: time.sleep(20), stop)
     assert time.perf_counter() - begin < 10
 
 
@@ -50,13 +50,14 @@ def test_completion_is_reported_on_and_not_waited_for(monkeypatch):
 def test_what_the_job_raises_comes_through():
     for error in (ValueError, TimeoutError):
         with pytest.raises(error):
-            run_cancellable(lambda error=error: (_ for _ in ()).throw(error("in the job")), lambda: None)
+            run_watched(lambda error=error: (_ for _ in ()).throw(error("in the job")), lambda: None)
 
 
 def test_a_job_is_reported_on_until_it_ends():
     calls = []
-    assert run_cancellable(lambda: time.sleep(0.6) or "done", lambda: calls.append(None)) == "done"
-    assert calls
+    with reporting(lambda fraction, step: calls.append(fraction)):
+        assert run_cancellable(lambda: time.sleep(0.6) or "done") == "done"
+        assert calls
 
 
 @pytest.mark.parametrize("seen", [lambda fraction, step: None, None])

@@ -16,7 +16,7 @@ from .errors import SourceError, UnsupportedTypeError
 from .fields.field import Field
 from .fields.sharpening import sharpen
 from .grids.grid import Dimension, Grid
-from .jobs import Progress, within
+from .jobs import Progress, bound_progress, part_of_work
 from .mesh.box_tree import room_around
 from .mesh.polylines import FillRule
 from .shapes.area_elements import bounds_around
@@ -268,7 +268,9 @@ def signed_distance(
     for option in options:
         if option not in accepted:
             raise UnsupportedTypeError(
-                f"{option} is not an option here", remedy=f"the options are {', '.join(accepted)}", element=option
+                f"{option} is not an option here",
+                remedy=f"the options are {', '.join([*accepted, 'progress'])}",
+                element=option,
             )
     return measure(source, domain, **options)
 
@@ -276,7 +278,7 @@ def signed_distance(
 DEFAULTS = {
     parameter.name: parameter.default
     for parameter in inspect.signature(signed_distance).parameters.values()
-    if parameter.kind is parameter.KEYWORD_ONLY
+    if parameter.kind is parameter.KEYWORD_ONLY and parameter.name != "progress"
 }
 """Options of `signed_distance` with their defaults. An option that differs from its default is refused if it does not
 apply to the kind of source."""
@@ -290,12 +292,13 @@ def distance_to_solid(
     spacing: ArrayLike | None = None,
     padding: float | None = None,
     band: float | None = None,
-    progress: Progress | None = None,
 ) -> Field[Grid] | Field[TetMesh]:
     """Compute the signed distance to a solid on a grid or on tets, with the options of `signed_distance`."""
     if domain is None or isinstance(domain, Grid):
-        return solid.field(resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=progress)
-    return completed_distance(solid, domain, Completion(), Heat(), band, progress)
+        return solid.field(
+            resolution, spacing=spacing, padding=padding, grid=domain, band=band, progress=bound_progress()
+        )
+    return completed_distance(solid, domain, Completion(), Heat(), band)
 
 
 def is_plain(plain: bool, method: Heat) -> bool:
@@ -312,7 +315,6 @@ def measured_distance(
     options: Completion,
     method: Heat,
     plain: bool,
-    progress: Progress | None = None,
     **in_band: Any,
 ) -> Any:
     """Return the field of the signed distance to a shape or to lines on a grid or on tets.
@@ -323,12 +325,12 @@ def measured_distance(
     if is_plain(plain, method):
         if isinstance(shape, TriangleMesh | PolygonMesh) and not options.as_oriented:
             shape = orient(shape)
-        return SignedHeatSolver[Any](domain, method.diffusion, progress).distance(shape, method.constraint)
+        return SignedHeatSolver[Any](domain, method.diffusion, bound_progress()).distance(shape, method.constraint)
     if isinstance(domain, Grid) and domain.dimension == 2:
         if options.completion == "none":
-            return unsigned_distance_to_lines(shape, domain, progress=progress)
-        return distance_to_lines(shape, domain, **vars(method), as_oriented=options.as_oriented, progress=progress)
-    return completed_distance(shape, domain, options, method, progress=progress, **in_band)
+            return unsigned_distance_to_lines(shape, domain)
+        return distance_to_lines(shape, domain, **vars(method), as_oriented=options.as_oriented)
+    return completed_distance(shape, domain, options, method, **in_band)
 
 
 def grid_around(
@@ -410,7 +412,6 @@ def distance_to_shapes(
     diffusion: float = 1.0,
     as_oriented: bool = False,
     keep_overlaps: bool = False,
-    progress: Progress | None = None,
 ) -> Field[Grid] | Field[TetMesh]:
     """Compute the signed distance to shapes in space on a grid or on tets, with the options of `signed_distance`."""
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps)
@@ -418,7 +419,7 @@ def distance_to_shapes(
     joined = joined_shape(shape)
     if domain is None:
         domain = Grid.around(bounds_around([joined]), resolution, padding, spacing)
-    return completed_distance(joined, domain, options, method, band, progress)
+    return completed_distance(joined, domain, options, method, band)
 
 
 def completed_distance(
@@ -427,7 +428,6 @@ def completed_distance(
     options: Completion,
     method: Heat,
     band: float | None = None,
-    progress: Progress | None = None,
     **tiles: Any,
 ) -> Field[Grid] | Field[TetMesh]:
     """Complete a shape, and return the field of the signed distance to the solid on a grid or on tets.
@@ -436,9 +436,10 @@ def completed_distance(
     """
     if band is not None and not isinstance(domain, Grid):
         raise UnsupportedTypeError("a band is computed around solids, on a grid in space", remedy="leave out the band")
-    solid = completed(shape, options, method, within(progress, 0.0, 0.5))
-    progress = within(progress, 0.5, 1.0)
-    if isinstance(domain, Grid):
-        return solid.field(grid=domain, band=band, progress=progress, **tiles)
-    phi = sharpen(Field(domain, solid.distance(domain.vertices)), solid.boundary, progress=progress)
+    with part_of_work(0.0, 0.5):
+        solid = completed(shape, options, method)
+    with part_of_work(0.5, 1.0):
+        if isinstance(domain, Grid):
+            return solid.field(grid=domain, band=band, progress=bound_progress(), **tiles)
+        phi = sharpen(Field(domain, solid.distance(domain.vertices)), solid.boundary, progress=bound_progress())
     return replace(phi, diagnostics=phi.diagnostics.noting(*solid.diagnostics.notes))

@@ -71,61 +71,103 @@ class Announcement:
                 sys.stderr.flush()
 
 
+_thread = threading.local()  # not a `ContextVar`, which new threads inherit on some versions of Python
+
+
+@dataclass(eq=False)
+class Reports:
+    """A callback that is bound to a thread. Calls report a fraction of the present part of the work, and a step."""
+
+    callback: Progress
+    start: float = 0.0  # the fractions of the whole work at which the present part begins
+    stop: float = 1.0  # and ends
+    fraction: float = 0.0  # the last fraction of the whole work that was reported; it never goes back
+    step: str = "begin"  # the last step
+
+    def __call__(self, fraction: float, step: str) -> None:
+        self.fraction = max(self.fraction, self.start + fraction * (self.stop - self.start))
+        self.step = step
+        self.again()
+
+    def again(self) -> None:
+        """Report the last fraction and step again."""
+        with reporting(None):  # the callback may call functions that report
+            self.callback(self.fraction, self.step)
+
+
+def bound_progress() -> Reports | None:
+    """Return what is bound to this thread, to be passed on as `progress` to public functions; None if nothing is."""
+    return getattr(_thread, "reports", None)
+
+
+@contextmanager
+def reporting(progress: Progress | None) -> Iterator[None]:
+    """Within a ``with`` block, let `report` call `progress`, which is told at the end that all is done.
+
+    None lets it call nothing. What is bound already stays as it is.
+    """
+    before = bound_progress()
+    if progress is before:
+        yield
+        return
+    _thread.reports = reports = None if progress is None else Reports(progress)
+    try:
+        yield
+        if reports is not None:
+            reports(1.0, "done")
+    finally:
+        _thread.reports = before
+
+
+@contextmanager
+def part_of_work(start: float, stop: float) -> Iterator[None]:
+    """Within a ``with`` block, let the fractions 0 to 1 that are reported be `start` to `stop` of the part around."""
+    reports = bound_progress()
+    if reports is None:
+        yield
+        return
+    before, size = (reports.start, reports.stop), reports.stop - reports.start
+    reports.start, reports.stop = before[0] + start * size, before[0] + stop * size
+    try:
+        yield
+    finally:
+        reports.start, reports.stop = before
+
+
+def report(fraction: float, step: str) -> None:
+    """Report the fraction done of the present part, from 0 to 1, and the step that begins, if a callback is bound.
+
+    An exception that the callback raises cancels the work.
+    """
+    reports = bound_progress()
+    if reports is not None:
+        reports(fraction, step)
+
+
+def report_again() -> None:
+    """Report the last fraction and step again, so that long loops can be cancelled."""
+    reports = bound_progress()
+    if reports is not None:
+        reports.again()
+
+
 class Stopwatch:
-    """Measures and logs the seconds that each of several named steps takes, and reports progress."""
+    """Measures, logs and reports each of several named steps of a part of the work."""
 
-    def __init__(self, progress: Progress | None, steps: int) -> None:
+    def __init__(self, steps: int) -> None:
         self.seconds: dict[str, float] = {}
-        self._progress, self._steps = progress, steps
-
-    def skip(self, steps: int) -> None:
-        """Reduce the number of expected steps by `steps`."""
-        self._steps -= steps
+        self._steps = steps
 
     @contextmanager
-    def __call__(self, step: str) -> Iterator[Callable[[Callable[[], Result]], Result]]:
-        """Time the ``with`` block of a step, and yield a function that runs a job.
-
-        While a job runs, progress is reported again and again, and may raise an exception to cancel.
-        """
-        progress, share, report = self._progress, len(self.seconds) / self._steps, None
-        if progress is not None:
-            progress(share, step)
-            report = partial(progress, share, step)
-        begin = time.perf_counter()
-        yield lambda job: run_cancellable(job, report)
+    def __call__(self, step: str) -> Iterator[None]:
+        """Time the ``with`` block of a step, which is a part of the work of the same size as every other."""
+        done = len(self.seconds)
+        with part_of_work(done / self._steps, (done + 1) / self._steps):
+            report(0.0, step)
+            begin = time.perf_counter()
+            yield
         self.seconds[step] = time.perf_counter() - begin
         logger.info("%s: %.3f s", step, self.seconds[step])
-        if len(self.seconds) == self._steps:
-            finish(self._progress)
-
-
-def finish(progress: Progress | None) -> None:
-    """Report that a computation is done."""
-    if progress is not None:
-        progress(1.0, "done")
-
-
-def within(progress: Progress | None, start: float, stop: float) -> Progress | None:
-    """Return the callback for a part of a computation, whose fractions 0 to 1 are `start` to `stop` of the whole."""
-    if progress is None:
-        return None
-    whole = progress
-    return lambda fraction, step: whole(start + fraction * (stop - start), step)
-
-
-def growing(progress: Progress | None) -> Progress | None:
-    """Return a callback that reports the largest fraction so far, so that progress never goes back."""
-    if progress is None:
-        return None
-    whole, most = progress, 0.0
-
-    def report(fraction: float, step: str) -> None:
-        nonlocal most
-        most = max(most, fraction)
-        whole(most, step)
-
-    return report
 
 
 ENTRY_PROGRAM = (
@@ -145,9 +187,6 @@ class Flag:
 
     parent: Flag | None  # the flag of the thread that started it
     is_raised: bool = False  # whether nobody waits for the result any more
-
-
-_thread = threading.local()
 
 
 def own_flag() -> Flag:
@@ -184,10 +223,10 @@ def settle(future: Future[Any], job: Callable[[], Any]) -> None:
         future.set_exception(error)
 
 
-def awaited(future: Future[Result], report: Callable[[], None] = stop_if_abandoned) -> Result:
-    """Wait for the result of a future, and call `report` every tenth of a second.
+def awaited(future: Future[Result], watch: Callable[[], None] = stop_if_abandoned) -> Result:
+    """Wait for the result of a future, and call `watch` every tenth of a second.
 
-    An exception that `report` raises, and Ctrl-C, end the wait.
+    An exception that `watch` raises, and Ctrl-C, end the wait.
     """
     while True:
         try:
@@ -195,21 +234,24 @@ def awaited(future: Future[Result], report: Callable[[], None] = stop_if_abandon
         except FutureTimeout:
             if future.done():  # the job itself raised the error
                 raise
-            report()
+            watch()
 
 
-def run_cancellable(job: Callable[[], Any], report: Callable[[], None] | None) -> Any:
-    """Run a job on its own thread, call `report` every tenth of a second until it ends, and return its result.
+def run_cancellable(job: Callable[[], Result]) -> Result:
+    """Run a job and return its result. If a callback is bound, it can cancel the job, however long that takes."""
+    return job() if bound_progress() is None else run_watched(job, report_again)
 
-    An exception from `report` is raised at once, and so is Ctrl-C; the job then ends at the next kernel that it calls.
+
+def run_watched(job: Callable[[], Result], watch: Callable[[], None]) -> Result:
+    """Run a job on its own thread, call `watch` every tenth of a second until it ends, and return its result.
+
+    An exception from `watch` is raised at once, and so is Ctrl-C; the job then ends at the next kernel that it calls.
     """
-    if report is None:
-        return job()
-    future: Future[Any] = Future()
+    future: Future[Result] = Future()
     flag = own_flag()
     try:
         start_thread(partial(settle, future, job), flag)
-        return awaited(future, report)
+        return awaited(future, watch)
     except BaseException:
         flag.is_raised = True
         raise
@@ -247,7 +289,7 @@ def interruptible(function: Callable[..., Result], *arguments: Any, **named: Any
             thread.join()
 
 
-def run_limited(job: Callable[[], Any], seconds: float) -> Any:
+def run_limited(job: Callable[[], Result], seconds: float) -> Result:
     """Run a job on its own thread and return its result; raise `TimeoutError` if it takes longer than `seconds`.
 
     A late job is told to stop, and ends at the next kernel that it calls.
@@ -258,7 +300,7 @@ def run_limited(job: Callable[[], Any], seconds: float) -> Any:
         if time.monotonic() > end:
             raise TimeoutError(f"it takes more than {seconds:.0f} seconds")
 
-    return run_cancellable(job, refuse_to_wait)
+    return run_watched(job, refuse_to_wait)
 
 
 def command_for(entry: str, *arguments: str) -> list[str]:

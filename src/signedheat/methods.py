@@ -28,15 +28,14 @@ from .errors import (
 )
 from .fields.field import Field
 from .fields.field_domain import FieldDomain
-from .geodesics.exact_distance import Report
-from .jobs import Progress
+from .jobs import Progress, bound_progress, report
 from .linear.direct_integration import DirectIntegration
 from .linear.splitting import split_rounds
 from .linear.threads import one_blas_thread
 from .mesh.intrinsic_mesh import IntrinsicMesh
 from .mesh.tet_shapes import Tetrahedra
 from .surfaces.extrapolation import Extrapolated as Extrapolated
-from .validation import finite_number, positive_number
+from .validation import finite_number, positive_number, public_call
 
 __all__ = ["Convex", "Extrapolated", "Geodesic"]
 
@@ -114,27 +113,23 @@ class Nearest:
 
 
 @singledispatch
-def nearest(
-    domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, report: Report | None
-) -> Nearest:
+def nearest(domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float) -> Nearest:
     """Measure distance to the nearer of a source and the zero set of φ, with `values` at the unknowns.
 
     Every type of domain registers a function of its own. `source` is the one that φ was computed from. `given`, if not
-    None, are curves or shapes to which distance is exact, and whose gaps the zero set closes. `report` is called now
-    and then, and may raise an exception to cancel.
+    None, are curves or shapes to which distance is exact, and whose gaps the zero set closes.
     """
     raise UnsupportedTypeError(f"there are no straight lines on a {type(domain).__name__}", element="method")
 
 
 def distance_to_nearest(
-    domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float, progress: Progress | None
+    domain: Any, values: Floats, source: SourceTerm | None, given: Any, tolerance: float
 ) -> tuple[Floats, tuple[Note, ...]]:
     """Return (n,) signed distances to the nearer of a source and the zero set, and notes for the diagnostics.
 
     The arguments are those of `nearest`. Unknowns that neither reaches keep their values, and NaN stays NaN.
     """
-    report = None if progress is None else lambda: progress(0.0, "sharpen")
-    measured = nearest(domain, values, source, given, tolerance, report)
+    measured = nearest(domain, values, source, given, tolerance)
     reached = np.isfinite(measured.distances)
     if not reached.any():
         raise OutsideError(
@@ -243,6 +238,7 @@ class Geodesic(Method):
                 f"tolerance must be at least 0 and below 0.1, not {self.tolerance}", element="tolerance"
             )
 
+    @public_call
     def sharpened(
         self,
         discretization: Discretization,
@@ -251,7 +247,7 @@ class Geodesic(Method):
         source: SourceTerm | None,
         progress: Progress | None,
     ) -> tuple[Floats, tuple[Note, ...]]:
-        return distance_to_nearest(discretization, values, source, None, self.tolerance, progress)
+        return distance_to_nearest(discretization, values, source, None, self.tolerance)
 
 
 SOURCE_TOLERANCE = 0.1 * Geodesic.tolerance
@@ -302,6 +298,7 @@ class Convex(Method):
                 f"relaxation must be at least 1 and below 2, not {self.relaxation}", element="relaxation"
             )
 
+    @public_call
     def sharpened(
         self,
         discretization: Discretization,
@@ -338,8 +335,7 @@ class Convex(Method):
                 gaps = [((slopes - limited) ** 2).sum(axis=1), ((limited - before) ** 2).sum(axis=1)]
                 residual = max(np.sqrt(sizes @ gap / total) for gap in gaps)
                 number += 1
-                if progress is not None:
-                    progress(number / self.max_rounds, "sharpen")
+                report(number / self.max_rounds, "sharpen")
         return np.where(np.isnan(values), np.nan, phi), (ConvexRounds(number, float(residual)),)
 
 
@@ -354,7 +350,7 @@ def typical_size(sizes: Floats, dimension: int) -> float:
 
 
 @singledispatch
-def sharpen_on(domain: object, field: Any, source: Any, method: Method | None, progress: Progress | None) -> Field[Any]:
+def sharpen_on(domain: object, field: Any, source: Any, method: Method | None) -> Field[Any]:
     """Sharpen a field on a domain. Every type of domain registers a function of its own for `sharpen` to call."""
     kind = type(field if domain is None else domain).__name__
     raise UnsupportedTypeError(
@@ -369,7 +365,6 @@ def sharpened(
     values: Floats,
     source: Any,
     method: Method | None,
-    progress: Progress | None,
 ) -> tuple[Floats, Diagnostics]:
     """Return the sharpened values of a field on a surface or on tets, and diagnostics with the slope errors.
 
@@ -390,10 +385,10 @@ def sharpened(
         vertex = f"vertex {np.argmax(np.isinf(values))}"
         raise GeometryError(f"the field is infinite at {vertex}", remedy="compute it again", element=vertex)
     if source is None:
-        run = partial(method.sharpened, discretization, elements, values, field.source, progress)
+        run = partial(method.sharpened, discretization, elements, values, field.source, bound_progress())
     else:
-        run = partial(distance_to_nearest, discretization, values, field.source, source, SOURCE_TOLERANCE, progress)
-    new, diagnostics = timed(run, field.diagnostics, progress)
+        run = partial(distance_to_nearest, discretization, values, field.source, source, SOURCE_TOLERANCE)
+    new, diagnostics = timed(run, field.diagnostics)
     worse = elements.bounded_slope_error(new) > 1.5 * elements.bounded_slope_error(values) + ADDED_SLOPE_ERROR
     errors = SlopeErrors(elements.slope_error(values), elements.slope_error(new), worse)
     if worse:
@@ -401,15 +396,10 @@ def sharpened(
     return new, diagnostics.noting(errors)
 
 
-def timed(
-    run: Callable[[], tuple[Floats, tuple[Note, ...]]], before: Diagnostics, progress: Progress | None
-) -> tuple[Floats, Diagnostics]:
+def timed(run: Callable[[], tuple[Floats, tuple[Note, ...]]], before: Diagnostics) -> tuple[Floats, Diagnostics]:
     """Call ``run()``, which returns values and notes; return the values, and diagnostics with the notes and time."""
     begin = time.perf_counter()
-    if progress is not None:
-        progress(0.0, "sharpen")
+    report(0.0, "sharpen")
     values, notes = run()
-    if progress is not None:
-        progress(1.0, "done")
     timings = {**before.timings, "sharpen": time.perf_counter() - begin}
     return values, replace(before, timings=timings).noting(*notes)

@@ -434,7 +434,7 @@ def offset(
     if MITRE_LIMITS[corners] > 1:  # cells as large as above, so that corners do not change the resolution
         bounds = solid.bounds + sides * MITRE_LIMITS[corners] * max(largest, 0.0)
         grid = Grid.around(bounds, padding=2 * float(grid.spacing.max()), spacing=grid.spacing)
-    return sharp_surface(Offset(solid, reach, MITRE_LIMITS[corners]), grid, progress)
+    return sharp_surface(Offset(solid, reach, MITRE_LIMITS[corners]), grid)
 
 
 @public_call

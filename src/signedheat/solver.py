@@ -16,7 +16,7 @@ from .errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from .fields.field import Field
 from .fields.solutions import to_field, warned
 from .grids.grid import Dimension, Grid
-from .jobs import Progress, Stopwatch, within
+from .jobs import Progress, Stopwatch, bound_progress, part_of_work, report, reporting
 from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .shapes.foreign import ForeignShape, as_list, converted
 from .shapes.kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
@@ -130,10 +130,10 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
 
         The option `intrinsic` decides which.
         """
-        report = within(self.progress, 0.2, 0.4)
-        if self.intrinsic == "auto":
-            return lowered_by_angles(self.domain, report)
-        return Retriangulated(triangle_mesh(self.domain), report) if self.intrinsic else discretize(self.domain)
+        with reporting(bound_progress() or self.progress):
+            if self.intrinsic == "auto":
+                return lowered_by_angles(self.domain)
+            return Retriangulated(triangle_mesh(self.domain)) if self.intrinsic else discretize(self.domain)
 
     def with_diffusion(self, diffusion: Diffusion | None) -> SignedHeatSolver[AnyDomain]:
         """Return a solver on the same domain with another diffusion factor τ.
@@ -217,7 +217,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         >>> sh.SignedHeatSolver(plane).distance(upwards).values.round(3).tolist()  # positive on its left
         [1.0, -1.0, -1.0, 1.0]
         """
-        return warned(self._distance(sources, constraint))
+        with reporting(self.progress):
+            return warned(self._distance(sources, constraint))
 
     @cached_property
     def _repaired(self) -> tuple[RepairedMesh, SignedHeatSolver[Any]] | None:
@@ -231,7 +232,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             repaired, solver = self._repaired
             return repaired.on_given(cast("Field[Any]", solver._distance(repaired.on_it(sources), constraint)))
         constraint = checked(constraint)
-        stopwatch = Stopwatch(self.progress, steps=5)
+        stopwatch = Stopwatch(steps=5)
         with stopwatch("prepare"):
             _ = self.discretization  # made once, and kept
         with stopwatch("sources"):
@@ -255,7 +256,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         listed, left_out = given_curves(self.domain, as_list(sources))
         kept = numbers_kept(len(listed), left_out)
         _warn_of_one_sided_curves(self.domain, listed, kept)
-        discretization, adapted = self.discretization.adapt(listed)
+        with part_of_work(0.0, 0.4):
+            discretization, adapted = self.discretization.adapt(listed)
         times = default_diffusion(discretization) if self.diffusion is None else self.diffusion
         terms = lowered_for_times(discretization, adapted, times)
         if isinstance(constraint, LevelValues):
@@ -316,6 +318,11 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
         >>> [round(phi([1.0, 0.5]).item(), 2) for phi in solver.distance_many(lines)]
         [-0.5, 0.5]
         """
+        with reporting(self.progress):
+            return self._distance_many(sources, constraint)
+
+    def _distance_many(self, sources: Sequence[Sources], constraint: Constraint | None) -> Sequence[Field]:
+        """Compute the fields of `distance_many`."""
         constraint = checked(constraint)
         try:
             listed = list(sources)
@@ -326,8 +333,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             ) from None
         if self._repaired is not None:
             repaired, solver = self._repaired
-            return [repaired.on_given(f) for f in solver.distance_many([repaired.on_it(s) for s in listed], constraint)]
-        report = within(self.progress, 0.4, 1.0)  # before, the domain is discretised
+            on_it = solver._distance_many([repaired.on_it(entry) for entry in listed], constraint)
+            return [repaired.on_given(each) for each in on_it]
         fields: list[Field] = []
         for begin in range(0, len(listed), SOURCES_AT_ONCE):
             batch = (self._prepared(entry, constraint) for entry in listed[begin : begin + SOURCES_AT_ONCE])
@@ -337,8 +344,8 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                 alike = list(run)
                 by_time = list(zip(*(prepared.terms for prepared in alike), strict=True))
                 first = by_time[0]
-                stopwatch = Stopwatch(None, steps=1)
-                with stopwatch("together"):
+                stopwatch = Stopwatch(steps=1)
+                with reporting(None), stopwatch("together"):
                     diffused = [diffuse_many(discretization, terms) for terms in by_time]
                     directions = (
                         blended(prepared.terms, [normalize(discretization, vectors) for vectors in of_times])
@@ -349,7 +356,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
                 for source, values, prepared in zip(first, solved, alike, strict=True):
                     diagnostics = Diagnostics(timings=seconds, time=source.time, notes=prepared.notes)
                     fields.append(warned(to_field(discretization, values, source, diagnostics)))
-            if report is not None:
+            with part_of_work(0.4, 1.0):  # before, the domain is discretised
                 report(len(fields) / len(listed), f"{len(fields)} of {len(listed)}")
         return fields
 
@@ -382,7 +389,7 @@ def field_without_heat(
     The source has the curves lowered to the triangles of the solver. The function returns (n,) values at their vertices
     and notes for the diagnostics, or None. Then the result is None, too.
     """
-    stopwatch = Stopwatch(None, steps=1)
+    stopwatch = Stopwatch(steps=1)
     with stopwatch("distance"):
         discretization, terms, notes, _ = solver._prepared(curves, ZeroSet())
         source = cast("SurfaceSource", terms[0])

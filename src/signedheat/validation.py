@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from .arrays import Bools, Floats, Ints, mask_of
 from .errors import GeometryError, SignedHeatError, UnsupportedTypeError, counted, quoted
+from .jobs import reporting
 from .memory import within_memory
 
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -372,15 +373,22 @@ def public_call(function: Callable[P, T]) -> Callable[P, T]:
     """Decorate a public function, so that common mistakes in its arguments raise errors with a remedy.
 
     These are vertices and faces as two arguments, and a `progress` that cannot be called. A lack of memory raises
-    `MemoryLimitError`.
+    `MemoryLimitError`. If the function has a parameter `progress`, what it is given is bound (`jobs.reporting`), so
+    that its body need not mention it.
     """
     guarded = within_memory(function)
+    parameters = signature(function).parameters
+    named = [name for name, each in parameters.items() if each.kind is not each.KEYWORD_ONLY]
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> T:
         refuse_pair_apart(args, function.__name__)
-        callback(kwargs.get("progress"), "progress(fraction, step)")
-        return guarded(*args, **kwargs)
+        if "progress" not in parameters:
+            return guarded(*args, **kwargs)
+        given: dict[str, Any] = {**dict(zip(named, args, strict=False)), **kwargs}
+        callback(given.get("progress"), "progress(fraction, step)")
+        with reporting(given.get("progress")):
+            return guarded(*args, **kwargs)
 
     return checked
 

@@ -59,9 +59,9 @@ def placed(mesh: sh.TriangleMesh, kind: str) -> PlacedSegments:
 @pytest.mark.parametrize("mesh", [zigzag(60), awful(0), awful(1)], ids=["zigzag", "torus 0", "torus 1"])
 def test_distances_are_those_in_the_triangles_given(mesh, kind):
     triangles, sources = discretize(mesh).triangles, placed(mesh, kind)
-    before = exact.PausedSearch.start(triangles, sources, 0.0).until(10**7, None)
+    before = exact.PausedSearch.start(triangles, sources, 0.0).until(10**7)
     flipped, moved = in_delaunay_triangles(triangles, sources)
-    after = exact.PausedSearch.start(flipped, moved, 0.0).until(10**7, None)
+    after = exact.PausedSearch.start(flipped, moved, 0.0).until(10**7)
     assert share_to_flip(flipped) < 0.2 * share_to_flip(triangles)
     assert np.abs(after.distance()[: mesh.n_vertices] - before.distance()).max() < 1e-10
 
@@ -89,7 +89,7 @@ def test_lines_through_vertices_of_awful_triangles(seed):
     distance, _ = exact.distance_to_zero_line(triangles, values, 0.0)
     moved = exact.cleared(triangles, values, 1e-7 * triangles.lengths_of_edges.mean())
     flipped = exact.PausedSearch.start(*in_delaunay_triangles(triangles, zero_line(triangles, moved)), 0.0)
-    bound = flipped.until(10**7, None).distance()[: len(points)]
+    bound = flipped.until(10**7).distance()[: len(points)]
     assert np.abs(distance - bound).max() < 1e-7 * distance.max()
 
 
@@ -98,7 +98,7 @@ def test_slivers_are_not_cut_short():
     mesh = zigzag(1000)
     triangles, heights = discretize(mesh).triangles, wave(mesh)
     limit = exact.window_limit(triangles)
-    given = exact.PausedSearch.start(triangles, zero_line(triangles, heights), 1e-4).until(limit, None)
+    given = exact.PausedSearch.start(triangles, zero_line(triangles, heights), 1e-4).until(limit)
     assert not given.has_ended
     distance, windows = exact.distance_to_zero_line(triangles, heights)
     assert windows < limit

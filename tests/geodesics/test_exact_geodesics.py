@@ -12,6 +12,7 @@ import pytest
 import signedheat as sh
 from signedheat.discretization import discretize
 from signedheat.geodesics.exact_distance import distance_to_zero_line, window_limit
+from signedheat.jobs import reporting
 from signedheat.mesh.intrinsic_mesh import IntrinsicMesh
 
 
@@ -109,13 +110,13 @@ def test_a_report_ends_the_search():
     triangles, values = random_faces(0, 30, 2000)
     calls = []
 
-    def report() -> None:
+    def report(fraction: float, step: str) -> None:
         calls.append(time.perf_counter())
         if len(calls) == 3:
             raise Cancelled
 
-    with pytest.raises(Cancelled):
-        distance_to_zero_line(triangles, values, 0.0, report)
+    with pytest.raises(Cancelled), reporting(report):
+        distance_to_zero_line(triangles, values, 0.0)
     assert len(calls) == 3
 
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import signedheat as sh
 
 from ..errors import SourceError, counted, percent, printable
+from ..jobs import reporting
 from .late_imports import curve_completion as closing
 from .late_imports import curve_distance as distance
 from .late_imports import diagnostics, numpy
@@ -162,15 +163,15 @@ def close(arguments: Namespace) -> Summary:
             field = sh.SignedHeatSolver(domain, arguments.diffusion, progress).distance(sources, constraint)
             completed = closing.zero_set(field, sources)
         else:
-            field, completed = closing.completion(
-                domain,
-                sources,
-                constraint,
-                arguments.diffusion or 1.0,
-                progress,
-                arguments.as_oriented or arguments.plain,
-                arguments.every_piece,
-            )
+            with reporting(progress):
+                field, completed = closing.completion(
+                    domain,
+                    sources,
+                    constraint,
+                    arguments.diffusion or 1.0,
+                    arguments.as_oriented or arguments.plain,
+                    arguments.every_piece,
+                )
     sh.io.write_curves(completed, arguments.output, domain)
     if arguments.preview:
         sh.view.save_surface(field, arguments.preview, completed, up="xyz".index(arguments.up))
@@ -219,16 +220,16 @@ def distance_on_surface(domain: Any, sources: list[Any], arguments: Namespace) -
         ):
             field = sh.SignedHeatSolver(domain, arguments.diffusion, progress, intrinsic).distance(sources, constraint)
         else:
-            field = distance.distance_to_curves(
-                sources,
-                domain,
-                constraint=constraint,
-                diffusion=arguments.diffusion or 1.0,
-                intrinsic=intrinsic,
-                as_oriented=arguments.as_oriented,
-                every_piece=arguments.every_piece,
-                progress=progress,
-            )
+            with reporting(progress):
+                field = distance.distance_to_curves(
+                    sources,
+                    domain,
+                    constraint=constraint,
+                    diffusion=arguments.diffusion or 1.0,
+                    intrinsic=intrinsic,
+                    as_oriented=arguments.as_oriented,
+                    every_piece=arguments.every_piece,
+                )
     return field
 
 

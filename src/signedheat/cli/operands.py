@@ -27,6 +27,7 @@ from ..io.key_figures import describe as describe
 from ..io.numerals import parsed_numbers
 from ..io.scenes import scale_to, unit_of
 from ..io.solid_arrays import holds_solid
+from ..jobs import reporting
 from ..memory import refuse_beyond_memory
 from ..solids.completion import Completing, Completion, completed
 from ..solids.heat_surfaces import Heat
@@ -113,8 +114,8 @@ def point_in_words(coordinates: Iterable[float]) -> str:
 
 def solid_of(arguments: Namespace, path: str) -> Any:
     """Read a shape and complete it to a solid, as the options say, and print important notes on standard error."""
-    with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress:
-        solid = completed(read_shape(arguments, path), *method_of(arguments), progress)
+    with prefix_errors(path), ProgressBar(is_quiet(arguments)) as progress, reporting(progress):
+        solid = completed(read_shape(arguments, path), *method_of(arguments))
     say_important(arguments, solid.diagnostics, path)
     return solid
 
@@ -237,9 +238,9 @@ def compute(shape: Any, domain: sh.Grid | sh.TetMesh, arguments: Namespace) -> s
     where: Any = (
         nullcontext(arguments.scheduler) if arguments.workers is None else ThreadPoolExecutor(arguments.workers)
     )
-    with ProgressBar(is_quiet(arguments)) as progress, where as scheduler:
+    with ProgressBar(is_quiet(arguments)) as progress, reporting(progress), where as scheduler:
         in_band = {"band": arguments.band, "store": arguments.tiles, "scheduler": scheduler}
-        field = measured_distance(shape, domain, *method_of(arguments), arguments.plain, progress, **in_band)
+        field = measured_distance(shape, domain, *method_of(arguments), arguments.plain, **in_band)
     say_important(arguments, field.diagnostics)
     return field
 

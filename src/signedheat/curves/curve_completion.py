@@ -13,7 +13,6 @@ from ..constraints import Constraint, EachComponent, LevelValues
 from ..discretization import discretize
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, warn_user
 from ..fields.field import Field
-from ..jobs import Progress
 from ..mesh.components import connected_components
 from ..mesh.intrinsic_mesh import IntrinsicMesh
 from ..parallel import PointTree
@@ -122,7 +121,6 @@ def completion(
     curves: CurvesAndPoints,
     constraint: Constraint | None,
     diffusion: float,
-    progress: Progress | None = None,
     as_oriented: bool = False,
     every_piece: bool = False,
 ) -> tuple[Field[SurfaceDomain], list[Curve]]:
@@ -148,7 +146,7 @@ def completion(
         field, _, doubt = distance_to_pieces(solver, kept, constraint, every_piece, numbers, pieces)
         return field if left_out is None else replace(field, diagnostics=field.diagnostics.noting(left_out)), doubt
 
-    field, doubt = on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion, progress), kept, always=True)
+    field, doubt = on_resolving_triangles(measured, SignedHeatSolver(surface, diffusion), kept, always=True)
     if doubt:
         warn_user(doubt, InexactWarning)
     completed = zero_set(field, curves)

@@ -18,7 +18,7 @@ from ..diagnostics import Note
 from ..errors import ConstraintError, InexactWarning, counted, percent, warn_user
 from ..fields.field import Field
 from ..fields.sharpening import sharpen
-from ..jobs import Progress, growing, within
+from ..jobs import bound_progress, part_of_work
 from ..mesh.components import connected_components, grouped
 from ..mesh.welding import GAP_UNITS, SEAM_UNITS, joined_rims
 from ..methods import SOURCE_TOLERANCE
@@ -295,7 +295,6 @@ def distance_to_curves(
     intrinsic: bool | Literal["auto"] = "auto",
     as_oriented: bool = False,
     every_piece: bool = False,
-    progress: Progress | None = None,
 ) -> Field[AnySurface]:
     """Compute the signed distance to curves and points on a surface, with the options of `signed_distance`.
 
@@ -308,14 +307,12 @@ def distance_to_curves(
             remedy="use SignedHeatSolver.distance",
         )
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
-    progress = growing(progress)  # triangles may be made twice, and sides decided before distance is measured
-    share = within(progress, 0.0, 0.7)
-    solver = SignedHeatSolver(domain, diffusion, share, intrinsic)
+    solver = SignedHeatSolver(domain, diffusion, intrinsic=intrinsic)
     given = as_curves(solver.domain, as_list(curves))
     warn_of_gaps(solver.domain)
     repaired = RepairedMesh.of(solver.domain)
     if repaired is not None:
-        solver, given = SignedHeatSolver(repaired.mesh, diffusion, share, intrinsic), repaired.on_it(given)
+        solver, given = SignedHeatSolver(repaired.mesh, diffusion, intrinsic=intrinsic), repaired.on_it(given)
     listed, left_out = given_curves(solver.domain, given)
 
     is_default = intrinsic == "auto"
@@ -338,7 +335,7 @@ def distance_to_curves(
         if not as_oriented:
             pieces = CurvePieces.of(surface_of(by), flat) if is_default else pieces_for_all(solver.domain, flat)
         if pieces is None or bound_as_given(pieces):
-            exact = distance_by_sides(by, given, progress)
+            exact = distance_by_sides(by, given)
             if exact is not None:
                 return exact, None, ""
         if as_oriented and left_out is not None:  # warnings call curves by their numbers among those given
@@ -351,12 +348,12 @@ def distance_to_curves(
                 return extended, near.on_whole(curves), doubt
         return completed(by, listed, pieces)
 
-    field, used, doubt = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
+    with part_of_work(0.0, 0.7):
+        field, used, doubt = on_resolving_triangles(measured, solver, listed) if is_default else measured(solver)
     if doubt:
         warn_user(doubt, InexactWarning)
-    sharpened = field if used is None else sharpen(field, used, progress=within(progress, 0.7, 1.0))
-    if used is None and progress is not None:
-        progress(1.0, "done")
+    with part_of_work(0.7, 1.0):
+        sharpened = field if used is None else sharpen(field, used, progress=bound_progress())
     if repaired is not None:
         sharpened = repaired.on_given(sharpened)
     return sharpened if left_out is None else replace(sharpened, diagnostics=sharpened.diagnostics.noting(left_out))
@@ -368,11 +365,8 @@ def on_its_triangles(solver: SignedHeatSolver[Any]) -> bool:
     return isinstance(solver.domain, TriangleMesh) and isinstance(made, SurfaceDiscretization) and not made.transfer
 
 
-def distance_by_sides(
-    solver: SignedHeatSolver[Any], curves: CurvesAndPoints, progress: Progress | None
-) -> Field[Any] | None:
+def distance_by_sides(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> Field[Any] | None:
     """Return the exact distance to curves that decide the side of every vertex without heat, or None if some do not."""
     if not isinstance(solver.domain, TriangleMesh):
         return None
-    report = None if progress is None else (lambda: progress(0.7, "distance"))
-    return field_without_heat(solver, curves, lambda source: distance_without_heat(source, SOURCE_TOLERANCE, report))
+    return field_without_heat(solver, curves, lambda source: distance_without_heat(source, SOURCE_TOLERANCE))

@@ -19,7 +19,7 @@ from ..fields.solid_queries import Closest
 from ..grids.grid import RESOLUTION, Grid
 from ..grids.marching import values_at_walls
 from ..grids.polyline import Polyline
-from ..jobs import Progress, Stopwatch, growing, within
+from ..jobs import Stopwatch, bound_progress, part_of_work, run_cancellable
 from ..mesh.components import sums_of
 from ..mesh.polylines import FillRule, without_seams
 from ..mesh.unit_vectors import unit
@@ -64,7 +64,6 @@ def distance_to_lines(
     fill: FillRule = "nonzero",
     as_oriented: bool = False,
     every_piece: bool = False,
-    progress: Progress | None = None,
 ) -> Field[Grid]:
     """Compute the signed distance to polylines in the plane, with the options of `signed_distance`.
 
@@ -83,7 +82,7 @@ def distance_to_lines(
         domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
     as_oriented, every_piece = flag(as_oriented, "as_oriented"), flag(every_piece, "every_piece")
     if domain.dimension != 2:
-        return SignedHeatSolver(domain, diffusion, progress).distance(listed, constraint)
+        return SignedHeatSolver(domain, diffusion, bound_progress()).distance(listed, constraint)
     notes: list[Note] = []
     is_drawing = not as_oriented and all(isinstance(line, Polyline) for line in listed)
     if is_drawing:
@@ -91,22 +90,24 @@ def distance_to_lines(
         notes += [filled] if filled else []
         if filled and all(line.closed for line in listed):
             drawing = Drawing(without_seams(segments_of_lines(listed)))
-            return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)), progress)
-        share = within(growing(progress), 0.0, 0.4)
-        listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece, share)
+            return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)))
+        with part_of_work(0.0, 0.4):
+            listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece)
         notes += [taken] if taken else []
-    solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, within(progress, 0.4, 0.8))
-    phi = cast("Field[Grid[Literal[2]]]", solver.distance(listed, constraint))
+    solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, bound_progress())
+    with part_of_work(0.4, 0.8):
+        phi = cast("Field[Grid[Literal[2]]]", solver.distance(listed, constraint))
     if is_drawing:
         closing = closing_lines(listed)
         if closing and bulges(phi, listed, closing):
-            phi = cast("Field[Grid[Literal[2]]]", solver.distance([*listed, *closing], constraint))
+            with part_of_work(0.4, 0.8):
+                phi = cast("Field[Grid[Literal[2]]]", solver.distance([*listed, *closing], constraint))
         beyond = values_at_walls(phi.values) < 0
         if beyond.all() or (closing and beyond.mean() > 0.5):  # what is bounded is inside, whichever way it runs
             listed, phi = [line.reversed() for line in listed], phi.with_values(-phi.values)
     drawing = Drawing.completed(segments_of_lines([line for line in listed if isinstance(line, Polyline)]), phi)
     diagnostics = replace(phi.diagnostics, notes=(*phi.diagnostics.notes, *notes))
-    return _field_of(drawing, domain, diagnostics, progress)
+    return _field_of(drawing, domain, diagnostics)
 
 
 def unsigned_distance_to_lines(
@@ -117,7 +118,6 @@ def unsigned_distance_to_lines(
     spacing: ArrayLike | None = None,
     padding: float | None = None,
     completion: Literal["none"] = "none",
-    progress: Progress | None = None,
 ) -> Field[Grid]:
     """Compute the unsigned distance to polylines in the plane, without completion; see `signed_distance`."""
     listed: list[Any] = as_list(lines)
@@ -130,14 +130,14 @@ def unsigned_distance_to_lines(
             )
     if domain is None:
         domain = Grid.around(bounds_around(listed), resolution, padding, spacing)
-    return _field_of(Drawing(segments_of_lines(listed), has_sides=False), domain, Diagnostics(), progress)
+    return _field_of(Drawing(segments_of_lines(listed), has_sides=False), domain, Diagnostics())
 
 
-def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics, progress: Progress | None) -> Field[Grid]:
+def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics) -> Field[Grid]:
     """Return the distance to a drawing at the nodes of a grid, as a field that holds the drawing."""
-    watch = Stopwatch(within(progress, 0.8, 1.0), 1)
-    with watch("measure") as run:
-        values = run(lambda: drawing.distance(grid.points.reshape(-1, 2)).reshape(grid.shape))
+    watch = Stopwatch(1)
+    with part_of_work(0.8, 1.0), watch("measure"):
+        values = run_cancellable(lambda: drawing.distance(grid.points.reshape(-1, 2)).reshape(grid.shape))
     timings = {**diagnostics.timings, **watch.seconds}
     return Field(grid, values, replace(diagnostics, timings=timings), solid=drawing)
 
@@ -198,7 +198,7 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
 
 
 def strokes_that_agree(
-    lines: Sequence[Polyline], numbers: Sequence[int], every_piece: bool, progress: Progress | None
+    lines: Sequence[Polyline], numbers: Sequence[int], every_piece: bool
 ) -> tuple[list[Polyline], CurvesTaken | None]:
     """Flip strokes so that they bound something together, and leave out those that do not.
 
@@ -213,7 +213,7 @@ def strokes_that_agree(
     curves = [sheet.polyline(np.pad((line.points - bounds[0]) / size, ((0, 0), (0, 1))), line.closed) for line in lines]
     field, _, doubt = on_resolving_triangles(
         lambda solver: distance_to_pieces(solver, curves, None, every_piece, np.array(numbers)),
-        SignedHeatSolver(sheet, 1.0, progress),
+        SignedHeatSolver(sheet, 1.0),
         curves,
     )
     if doubt:

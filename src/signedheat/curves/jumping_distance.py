@@ -27,7 +27,7 @@ from ..errors import (
     warn_user,
 )
 from ..fields.field import Field
-from ..jobs import Progress, Stopwatch, within
+from ..jobs import Progress, Stopwatch
 from ..linear import chosen_backend
 from ..memory import refuse_beyond_memory
 from ..mesh.curve_segments import CurveSegments
@@ -159,7 +159,7 @@ def piecewise_distance(
     if intrinsic is True:
         triangle_mesh(domain)  # refuses others
     listed, left_out = given_curves(domain, as_list(sources))
-    stopwatch = Stopwatch(progress, steps=5)
+    stopwatch = Stopwatch(steps=5)
     with stopwatch("prepare"):
         diffusion = positive_number(diffusion, "diffusion")
         domain, discretization = _retriangulated(domain, listed, intrinsic)
@@ -174,7 +174,7 @@ def piecewise_distance(
         slopes = corner_slopes(triangles, directions)
         problem = jump_problem(triangles, pairs, slopes, guarded_edges(triangles, parts))
         continuous = partial(is_continuous, triangles, pairs, slopes, directions)
-        solution = minimize(problem, progress=within(progress, 0.4, 0.6), enough=continuous)
+        solution = minimize(problem, enough=continuous)
         values = slopes + solution.constants[:, None]
     with stopwatch("cut"):
         cut = high_jumps(triangles, pairs, values)

@@ -18,7 +18,7 @@ from scipy import sparse
 
 from ..arrays import Bools, Complexes, Floats, Ints, mask_of
 from ..fields.field import Field
-from ..jobs import Progress
+from ..jobs import report
 from ..linear import factorize
 from ..linear.splitting import split_rounds
 from ..linear.threads import one_blas_thread
@@ -99,7 +99,6 @@ class JumpSolution:
 
 def minimize(
     problem: JumpProblem,
-    progress: Progress | None = None,
     enough: Callable[[Floats], bool] | None = None,
 ) -> JumpSolution:
     """Solve a `JumpProblem` by ADMM, splitting z = K c, until the relative gap is below `DUALITY_GAP`.
@@ -146,8 +145,7 @@ def minimize(
             if rounds % GROWTH_ROUNDS == 0 and _lags(spring, difference, low, high, z, before, scaled):
                 threshold *= THRESHOLD_GROWTH
                 scaled *= THRESHOLD_GROWTH  # so that the unscaled multipliers stay the same
-            if progress is not None:
-                progress(rounds / MOST_SPLITTING_ROUNDS, "integrate")
+            report(rounds / MOST_SPLITTING_ROUNDS, "integrate")
     moved = regions_moved(problem, best)
     return JumpSolution(moved, problem.objective(moved), bound, rounds)
 

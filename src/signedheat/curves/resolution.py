@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from ..discretization import discretize
 from ..errors import CancellingNormalsError, GeometryError, SourceError
-from ..jobs import Progress, within
+from ..jobs import part_of_work
 from ..shapes.foreign import as_list
 from ..shapes.kinds import SurfaceDomain
 from ..solver import SignedHeatSolver, with_discretization
@@ -42,7 +42,7 @@ def on_resolving_triangles(
     mesh = solver.domain
     if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
         try:
-            return measure(for_zero_set(mesh, solver.diffusion, solver.progress))
+            return measure(for_zero_set(mesh, solver.diffusion))
         except GeometryError:
             pass
     try:
@@ -69,10 +69,9 @@ def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveO
 
     A solver that does not make a triangulation for every set of sources is returned as it is.
     """
-    made = solver.discretization
-    if not isinstance(made, Retriangulated):
-        return solver
-    return with_discretization(solver, made.adapt(curves)[0])
+    with part_of_work(0.0, 0.4):
+        made = solver.discretization
+        return with_discretization(solver, made.adapt(curves)[0]) if isinstance(made, Retriangulated) else solver
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
@@ -80,7 +79,8 @@ def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
 
     Raises `SourceError` if the domain is no surface.
     """
-    made = solver.discretization
+    with part_of_work(0.0, 0.4):
+        made = solver.discretization
     surface = made if isinstance(made, SurfaceDiscretization) else discretize(solver.domain)
     if not isinstance(surface, SurfaceDiscretization):
         kind = type(solver.domain).__name__
@@ -94,9 +94,7 @@ def flattened(curves: CurvesAndPoints) -> list[CurveOrPoints]:
     return list(chain.from_iterable(c if isinstance(c, Sequence) and not isinstance(c, str) else [c] for c in listed))
 
 
-def for_zero_set(
-    mesh: TriangleMesh, diffusion: Diffusion | None, progress: Progress | None = None
-) -> SignedHeatSolver[TriangleMesh]:
+def for_zero_set(mesh: TriangleMesh, diffusion: Diffusion | None) -> SignedHeatSolver[TriangleMesh]:
     """Return a solver with ``intrinsic=True`` whose triangulations suit the zero set of φ, even for tiny curves."""
-    solver = SignedHeatSolver(mesh, diffusion, progress, intrinsic=True)
-    return with_discretization(solver, RetriangulatedForZeroSet(mesh, within(progress, 0.2, 0.4)))
+    solver = SignedHeatSolver(mesh, diffusion, intrinsic=True)
+    return with_discretization(solver, RetriangulatedForZeroSet(mesh))

@@ -120,4 +120,4 @@ def sharpen(
     >>> bool(np.abs(sharpened.values - (radius - 0.5)).max() < 0.01)
     True
     """
-    return sharpen_on(getattr(field, "domain", None), field, source, method, progress)
+    return sharpen_on(getattr(field, "domain", None), field, source, method)

@@ -17,9 +17,8 @@ negative y. A window is a row ``(s0, s1, p, q, sigma, kind)`` with the interval 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -27,6 +26,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from ..arrays import Bools, Complexes, Floats, Ints, read_only
 from ..compiled import compiled
+from ..jobs import report_again
 from ..memory import refuse_beyond_memory
 from ..mesh.components import grouped
 from ..mesh.conforming_refinement import cut_along, flip_new_faces
@@ -34,13 +34,8 @@ from ..mesh.intrinsic_mesh import IntrinsicMesh
 from .geodesic_sources import GeodesicSources, PlacedSegments, as_curve, nearest_shares, through_vertices, zero_line
 from .heap_kernels import Queue, pop, push
 
-Report: TypeAlias = Callable[[], None]
-"""A function that is called about every tenth of a second. An exception that it raises ends the search."""
 
-
-def distance_to_zero_line(
-    triangles: IntrinsicMesh, values: Floats, tolerance: float = 1e-4, report: Report | None = None
-) -> tuple[Floats, int]:
+def distance_to_zero_line(triangles: IntrinsicMesh, values: Floats, tolerance: float = 1e-4) -> tuple[Floats, int]:
     """Return (n,) distances of vertices to the zero set of a function linear in faces, and the number of windows made.
 
     `values` are those of the function at vertices, (n,). Each merge of windows changes distances by less than
@@ -48,14 +43,13 @@ def distance_to_zero_line(
     that number. Distances it has not found are lengths of paths along edges, which are too long.
     """
     values = cleared(triangles, values, 1e-7 * float(triangles.lengths_of_edges.mean()))
-    return distance_to_segments(triangles, zero_line(triangles, values), tolerance, report)
+    return distance_to_segments(triangles, zero_line(triangles, values), tolerance)
 
 
 def distance_to_segments(
     triangles: IntrinsicMesh,
     placed: PlacedSegments,
     tolerance: float = 1e-4,
-    report: Report | None = None,
     reach: float = np.inf,
 ) -> tuple[Floats, int]:
     """Return (n,) distances of vertices to segments and points, and the number of windows; see `distance_to_zero_line`.
@@ -66,12 +60,12 @@ def distance_to_segments(
     placed = through_vertices(triangles, placed)
     # a longer search is started anew in Delaunay triangles, since long edges of slivers see every segment of a curve
     many = min(30 * triangles.n_edges + 50_000, limit)
-    search = PausedSearch.start(triangles, placed, tolerance, reach).until(many, report)
+    search = PausedSearch.start(triangles, placed, tolerance, reach).until(many)
     better = None if search.has_ended else in_delaunay_triangles(triangles, placed)
     if better is not None:
-        anew = PausedSearch.start(*better, tolerance, reach).until(limit, report)
+        anew = PausedSearch.start(*better, tolerance, reach).until(limit)
         search = anew if anew.has_ended else search
-    search = search.until(limit, report)
+    search = search.until(limit)
     windows = min(search.windows, limit - 1) if search.has_ended else limit
     return search.distance()[: triangles.n_vertices], windows
 
@@ -153,12 +147,11 @@ class PausedSearch:
         """Number of windows made so far."""
         return int(self.search.counts[WINDOWS_MADE])
 
-    def until(self, limit: int, report: Report | None) -> PausedSearch:
+    def until(self, limit: int) -> PausedSearch:
         """Continue this search to its end, or until `limit` windows have been made, and return it."""
         search = self.search
         while not self.has_ended and search.counts[WINDOWS_MADE] < limit:
-            if report is not None:
-                report()
+            report_again()
             if search.counts[MISSING_ROWS]:
                 search.larger().counts[MISSING_ROWS] = 0
             most = min(search.counts[WINDOWS_MADE] + (1 << 16), limit)

@@ -58,7 +58,7 @@ def traced_path(triangles: IntrinsicMesh, placed: PlacedSegments, ends: LocatedP
         nearest = float((search.distance[corners] + gaps).min())
         if search.queue.keys[search.queue.items[0]] > nearest + late:
             break
-        paused.until(paused.windows + WINDOWS_AT_ONCE, None)
+        paused.until(paused.windows + WINDOWS_AT_ONCE)
     sources, best, points = SourcesByFace.of(placed.sources(triangles)), np.inf, ends[np.arange(0)]
     for i in range(len(ends)):
         length, crossed, weights = _trace(faces, search, sources, places, i)

@@ -24,7 +24,7 @@ from ..discretization import SourceTerm
 from ..errors import GeometryError, OutsideError, UnsupportedTypeError
 from ..fields.field import Field
 from ..fields.solid_queries import Scaled
-from ..jobs import Progress, run_cancellable
+from ..jobs import run_cancellable
 from ..methods import Method, Nearest, distance_to_nearest, nearest, sharpen_on, timed
 from ..parallel import PointTree, in_threads
 from ..search.face_tree import FaceFeatures, FaceTree
@@ -119,7 +119,7 @@ def redistance(values: ArrayLike, spacing: ArrayLike = 1.0, *, periodic: bool | 
 
 
 @sharpen_on.register
-def _(grid: Grid, field: Field[Grid], source: object, method: Method | None, progress: Progress | None) -> Field[Grid]:
+def _(grid: Grid, field: Field[Grid], source: object, method: Method | None) -> Field[Grid]:
     """Measure the distance of every node to the zero set.
 
     A field that holds its solid is exact already, so that only a factor, if it has one, is removed.
@@ -129,8 +129,6 @@ def _(grid: Grid, field: Field[Grid], source: object, method: Method | None, pro
             "fields on grids are measured to their zero set", remedy="leave out source and method", element="method"
         )
     if field.solid is not None:
-        if progress is not None:
-            progress(1.0, "done")
         return field / (abs(field.solid.factor) if isinstance(field.solid, Scaled) else 1.0)
     if isinstance(grid, Band):
         raise GeometryError("a field in a band cannot be sharpened", remedy="use its expand()", element="field")
@@ -140,22 +138,15 @@ def _(grid: Grid, field: Field[Grid], source: object, method: Method | None, pro
             remedy="fill them in, or use it as it is",
             element="field",
         )
-    run = partial(distance_to_nearest, grid, field.values, None, None, 0.0, progress)
-    values, diagnostics = timed(run, field.diagnostics, progress)
+    run = partial(distance_to_nearest, grid, field.values, None, None, 0.0)
+    values, diagnostics = timed(run, field.diagnostics)
     return Field(grid, values, diagnostics)
 
 
 @nearest.register
-def _(
-    grid: Grid,
-    values: Floats,
-    source: SourceTerm | None,
-    given: None,
-    tolerance: float,
-    report: Callable[[], None] | None,
-) -> Nearest:
+def _(grid: Grid, values: Floats, source: SourceTerm | None, given: None, tolerance: float) -> Nearest:
     """Measure the distance of every node to the zero set of values, and their sides."""
-    distances = run_cancellable(lambda: redistance(values, grid.spacing), report)
+    distances = run_cancellable(lambda: redistance(values, grid.spacing))
     return Nearest(np.abs(distances), np.sign(distances).astype(np.int64))
 
 

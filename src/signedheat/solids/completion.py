@@ -16,7 +16,7 @@ from ..arrays import Floats, Ints
 from ..constraints import Constraint, EachComponent, LevelValues
 from ..diagnostics import CompletedArea, Diagnostics, FacesRestored, Note, ShapeOriented, SmallParts
 from ..errors import ConstraintError, InexactWarning, SourceError, warn_user
-from ..jobs import Progress, Stopwatch, finish
+from ..jobs import Progress, Stopwatch, run_cancellable
 from ..linear.threads import one_blas_thread
 from ..memory import refuse_beyond_memory
 from ..mesh.arrangement import SAME_POINT
@@ -231,13 +231,11 @@ def complete(
     [-1.0, 1.0]
     """
     options = Completion(completion, lids, nested, as_oriented, keep_overlaps, seal, smallest)
-    return completed(shape, options, Heat(constraint, diffusion), progress)
+    return completed(shape, options, Heat(constraint, diffusion))
 
 
 @one_blas_thread()  # the others would wait busily for long after each of many small products
-def completed(
-    shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat, progress: Progress | None = None
-) -> Solid:
+def completed(shape: ShapeLike | Sequence[ShapeLike], options: Completion, method: Heat) -> Solid:
     """Complete a shape with checked options, see `complete`; return a solid as it is."""
     if isinstance(method.constraint, EachComponent | LevelValues):
         raise ConstraintError(
@@ -245,18 +243,16 @@ def completed(
             remedy="use SignedHeatSolver.distance",
         )
     if isinstance(shape, Solid):
-        finish(progress)
         return shape
     joined = joined_shape(shape)
     if options.smallest is not None and not isinstance(joined, PointCloud):
         kept = large_parts(joined.triangulation, options.smallest)
-        return _completed_instead(joined, *kept, replace(options, smallest=None), method, progress)
+        return _completed_instead(joined, *kept, replace(options, smallest=None), method)
     if options.completion == "none":
-        finish(progress)
         return _sheet(joined)
     if options.seal is not None and not isinstance(joined, PointCloud):
         skin = sealed(joined.triangulation, options.seal)
-        return _completed_instead(joined, *skin, replace(options, seal=None, as_oriented=True), method, progress)
+        return _completed_instead(joined, *skin, replace(options, seal=None, as_oriented=True), method)
     count = joined.n_points if isinstance(joined, PointCloud) else joined.triangulation.n_faces
     parts = "points" if isinstance(joined, PointCloud) else "faces"
     refuse_beyond_memory(
@@ -265,34 +261,34 @@ def completed(
         lambda n: bytes_to_complete(joined, n),
         lambda n: f"simplify it to {n} {parts}, or free memory",
     )
-    stopwatch = Stopwatch(progress, 2)
+    stopwatch = Stopwatch(2)
     if isinstance(joined, PointCloud):
-        with stopwatch("orient") as run:
+        with stopwatch("orient"):
             cloud, strays = without_strays(joined)
             notes = list[Note](strays)
             if not options.as_oriented:
-                cloud, note = run(partial(orient_points, cloud))
+                cloud, note = run_cancellable(partial(orient_points, cloud))
                 notes.append(note)
-        with stopwatch("complete") as run:
-            solid = run(partial(_from_points, cloud, method))
+        with stopwatch("complete"):
+            solid = run_cancellable(partial(_from_points, cloud, method))
     else:
         notes, owners = [] if options.as_oriented else [ShapeOriented()], owners_of(joined)
-        with stopwatch("orient") as run:
+        with stopwatch("orient"):
             by_lids = options.completion == "lids"
-            as_given = run(partial(solid_as_given, joined.triangulation)) if by_lids else None
+            as_given = run_cancellable(partial(solid_as_given, joined.triangulation)) if by_lids else None
             if as_given is None:
                 triangles, cut_from = divided_at_rims(joined.triangulation)
                 owners = owners[cut_from]
-                chain = run(lambda: Chain.of(triangles))
+                chain = run_cancellable(lambda: Chain.of(triangles))
                 decided = bounding(chain, options.nested, options.as_oriented)
                 if not options.as_oriented:
                     notes = [oriented_as(joined, owners, chain, decided).note]
                 if not chain.areas.any():
                     raise SourceError("all faces of the shape have zero area", element="shape")
                 chain = replace(chain)  # drops the cached properties that only `bounding` needs
-        with stopwatch("complete") as run:
+        with stopwatch("complete"):
             if as_given is None:
-                solid = run(partial(_from_mesh, triangles, chain, decided, options, method))
+                solid = run_cancellable(partial(_from_mesh, triangles, chain, decided, options, method))
                 solid = _with_whole_boundary(solid, triangles)
             else:
                 solid = as_given
@@ -342,13 +338,12 @@ def _completed_instead(
     note: Note,
     options: Completion,
     method: Heat,
-    progress: Progress | None,
 ) -> Solid:
     """Complete a mesh made of a shape; `cut_from` are the triangles of the shape that its faces are parts of.
 
     In the result, source and origins refer to the shape, and `note` comes first in the diagnostics.
     """
-    solid = completed(mesh, options, method, progress)
+    solid = completed(mesh, options, method)
     origins = np.where(solid.origins >= 0, owners_of(shape)[cut_from][solid.origins], -1)
     diagnostics = replace(solid.diagnostics, notes=(note, *solid.diagnostics.notes))
     source = shape if isinstance(shape, TriangleMesh) else None

@@ -25,7 +25,7 @@ from ..errors import InexactWarning, MemoryLimitError, OutsideError, percent, wa
 from ..grids.blocks import BLOCK, WINDOW, Blocks, BlockValues
 from ..grids.exact_levels import ON_LEVEL, NodeValues, on_level
 from ..grids.grid import Grid
-from ..jobs import Progress
+from ..jobs import report
 from ..memory import available_memory, libraries, refuse_beyond_memory
 from ..mesh.components import element_components, places_among, sums_of
 from ..mesh.dual_cells import (
@@ -385,32 +385,24 @@ def block_heights(offset: Offset, grid: Grid, blocks: Blocks) -> BlockValues:
     return BlockValues(blocks, values)
 
 
-def sharp_surface(
-    offset: Offset, grid: Grid, progress: Progress | None = None, heights: Floats | None = None
-) -> TriangleMesh:
+def sharp_surface(offset: Offset, grid: Grid, heights: Floats | None = None) -> TriangleMesh:
     """Extract the closed, manifold surface at a distance from a solid, with sharp edges and corners.
 
     `heights` are those above the surface at all nodes, (nx, ny, nz); by default they are computed near it only.
     """
-    report = progress or (lambda fraction, step: None)
     values: NodeValues
     if heights is None:
         values, crossings, around = _crossed_near(offset, grid)
     else:
         values, (crossings, around) = heights, crossed_between(heights, grid)
-    vertices, faces = traced(offset, grid, values, crossings, around, report)
+    vertices, faces = traced(offset, grid, values, crossings, around)
     announce_lost(offset, grid, vertices)
     report(1.0, "faces")
     return TriangleMesh(vertices, faces)
 
 
 def traced(
-    offset: ImplicitSurface,
-    grid: Grid,
-    values: NodeValues,
-    crossings: Crossings,
-    around: CrossedCells,
-    report: Progress,
+    offset: ImplicitSurface, grid: Grid, values: NodeValues, crossings: Crossings, around: CrossedCells
 ) -> tuple[Floats, Ints]:
     """Return (n, 3) vertices and (m, 3) faces of a surface, given the grid edges that it crosses and the cells around.
 

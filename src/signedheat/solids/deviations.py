@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import SourceError, counted
-from ..jobs import Progress, Stopwatch, within
+from ..jobs import Progress, Stopwatch, bound_progress, part_of_work, run_cancellable
 from ..mesh.triangles import face_areas
 from ..packages import lazy_module
 from ..search.face_tree import EQUALLY_NEAR, FaceFeatures, FaceTree, NearestFaces
@@ -343,9 +343,10 @@ def deviation(
     points = shape.points if isinstance(shape, PointCloud) else shape.vertices
     if points.shape[1] != 3:
         raise SourceError("the scan lies in the plane", remedy="pass a shape in space", element="scan")
-    solid = complete(nominal, progress=within(progress, 0.0, 0.5))
-    with Stopwatch(within(progress, 0.5, 1.0), 1)("measure") as run:
-        return run(partial(_measured, shape, points, solid, nominal))
+    with part_of_work(0.0, 0.5):
+        solid = complete(nominal, progress=bound_progress())
+    with part_of_work(0.5, 1.0), Stopwatch(1)("measure"):
+        return run_cancellable(partial(_measured, shape, points, solid, nominal))
 
 
 def _measured(

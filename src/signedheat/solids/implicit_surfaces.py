@@ -243,7 +243,7 @@ def contour(
     if not is_sharp:
         points, faces = closed_surface(values, grid.spacing, 0.0)
         return TriangleMesh(on_level(surface.distance, points, values, grid.origin, grid.spacing, 0.0), faces)
-    return TriangleMesh(*traced(surface, grid, values, *crossed_between(values, grid), lambda fraction, step: None))
+    return TriangleMesh(*traced(surface, grid, values, *crossed_between(values, grid)))
 
 
 def _of_function(f: Function, gradient: Function | ArrayLike | None, box: Floats, grid: Grid, level: float) -> Implicit:

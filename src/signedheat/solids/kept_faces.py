@@ -14,7 +14,6 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import GeometryError, counted
 from ..grids.grid import RESOLUTION, Grid
-from ..jobs import Progress
 from ..mesh.arrangement import SAME_POINT, arranged, meeting_faces
 from ..mesh.components import element_components, numbered, sums_of
 from ..mesh.edges import edge_table
@@ -75,7 +74,7 @@ class KeptSurface:
     note: str = ""
 
 
-def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurface:
+def kept_surface(solid: Evaluated) -> KeptSurface:
     """Join the bounding triangles of a solid into a closed mesh, with parts of a contour where they do not join."""
     windings = solid.windings
     bounding = solid.triangles[solid.bounding]
@@ -91,7 +90,7 @@ def kept_surface(solid: Evaluated, progress: Progress | None = None) -> KeptSurf
         return KeptSurface(whole.mesh)
     grid = Grid.around(solid.bounds, RESOLUTION)
     cell = float(grid.spacing.max())
-    surface = sharp_surface(Offset(solid, 0.0), grid, progress)
+    surface = sharp_surface(Offset(solid, 0.0), grid)
     bad, best = [_far(surface, whole.points[whole.faces], MISSING_FACE * cell)], whole
     for attempt in range(MOST_CONTOURS):  # with other walls each time
         bad.append(_along(best.points[best.bad], 0.5 * cell))

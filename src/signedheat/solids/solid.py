@@ -18,7 +18,7 @@ from ..fields.field import Field
 from ..fields.solid_queries import Closest
 from ..grids.band import Band
 from ..grids.grid import RESOLUTION, Grid
-from ..jobs import Progress
+from ..jobs import Progress, bound_progress
 from ..mesh.box_tree import order_in_space
 from ..mesh.triangles import area_vectors, face_areas
 from ..mesh.welding import indexed
@@ -390,10 +390,10 @@ class Solid(Displayed, Represented, Frozen):
         if scheduler is not None and store is None:
             raise SourceError("a scheduler computes the tiles of a store", remedy="name a store", element="scheduler")
         if band is not None:
-            return band_field(self, where, band, store, scheduler, progress)
+            return band_field(self, where, band, store, scheduler)
         if store is not None:
             raise SourceError("only bands are stored tile by tile", remedy="give a band, or save the field")
-        return dense_field(self, where, progress)
+        return dense_field(self, where)
 
     @public_call
     def surface(
@@ -474,12 +474,10 @@ class Solid(Displayed, Represented, Frozen):
         smooth = not flag(sharp, "sharp")
         if tolerance is not None:
             within = positive_number(tolerance, "tolerance")
-            whole = self.surface(level, spacing=spacing, resolution=resolution, sharp=sharp, progress=progress)
+            whole = self.surface(level, spacing=spacing, resolution=resolution, sharp=sharp, progress=bound_progress())
             return simplified(whole, within)
         if level is None and spacing is None and resolution is None and not smooth:
-            kept = kept_surface(self, progress)
-            if progress is not None:
-                progress(1.0, "done")
+            kept = kept_surface(self)
             if kept.note:
                 warn_user(kept.note, InexactWarning)
             return kept.mesh
@@ -487,8 +485,8 @@ class Solid(Displayed, Represented, Frozen):
         reach = self.bounds + np.array([[-1.0], [1.0]]) * max(height, 0.0)
         where = Grid.around(reach, RESOLUTION if resolution is None else resolution, None, spacing)
         if not smooth:
-            return sharp_surface(Offset(self, height), where, progress)
-        contour = dense_field(self, where, progress).contour(height)
+            return sharp_surface(Offset(self, height), where)
+        contour = dense_field(self, where).contour(height)
         announce_lost(Offset(self, height), where, contour.vertices)
         return contour
 

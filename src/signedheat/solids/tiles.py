@@ -41,7 +41,7 @@ from ..grids.blocks import BLOCK, BLOCK_NODES, Blocks
 from ..grids.grid import Grid
 from ..grids.grid_discretization import refuse_large_grid
 from ..grids.nearest_nodes import SQUARE_ROUNDING, Lattice, nearest_at_nodes
-from ..jobs import Progress
+from ..jobs import report, reporting
 from ..memory import available_memory, libraries
 from ..packages import lazy_module
 from ..parallel import connected, in_threads, n_threads
@@ -86,7 +86,7 @@ class Evaluated(SolidQueries, Protocol):
     def uncrossed(self) -> bool: ...  # whether the triangles are known not to cross
 
 
-def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Field[Grid[Literal[3]]]:
+def dense_field(solid: Evaluated, grid: Grid) -> Field[Grid[Literal[3]]]:
     """Compute the signed distance to a solid at all nodes of a grid."""
     refuse_plane_grid(grid)
     refuse_large_grid(grid, BYTES_PER_DENSE_NODE, BYTES_AT_WORK)
@@ -105,8 +105,7 @@ def dense_field(solid: Evaluated, grid: Grid, progress: Progress | None) -> Fiel
     for done, (first, (distances, trusted)) in enumerate(zip(firsts, in_threads(tile, firsts), strict=True)):
         window = tuple(slice(f, f + n) for f, n in zip(BLOCK * first, distances.shape, strict=True))
         values[window], confidence[window] = distances, trusted
-        if progress is not None:
-            progress((done + 1) / len(firsts), "distance")
+        report((done + 1) / len(firsts), "distance")
     return cast("Field[Grid[Literal[3]]]", Field(grid, values, solid.diagnostics, confidence=confidence, solid=solid))
 
 
@@ -116,7 +115,6 @@ def band_field(
     width: float,
     store: str | PathLike[str] | None,
     scheduler: Scheduler,
-    progress: Progress | None,
 ) -> Field[Grid[Literal[3]]]:
     """Compute signed distance in the blocks of a grid within `width` of a solid, and on a coarse grid everywhere.
 
@@ -125,7 +123,8 @@ def band_field(
     refuse_plane_grid(grid)
     width = positive_number(width, "band")
     tree, windings = prepared(solid)
-    coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE_NODES)))), None)
+    with reporting(None):
+        coarse = dense_field(solid, coarser(grid, 1 << max(0, math.ceil(math.log2(max(grid.shape) / COARSE_NODES)))))
     reach = width + float(np.linalg.norm(grid.spacing))  # complete the cells at the ends of the band
     limit = blocks_that_fit(store)
     indices, factor = blocks_near(tree, grid, reach, limit)
@@ -150,10 +149,9 @@ def band_field(
             return rows
 
         for done, _ in enumerate(in_threads(solve, tiles)):
-            if progress is not None:
-                progress((done + 1) / len(tiles), "band")
+            report((done + 1) / len(tiles), "band")
     else:
-        values, confidence, note = in_store(Path(store), tree, windings, grid, blocks, tiles, scheduler, progress)
+        values, confidence, note = in_store(Path(store), tree, windings, grid, blocks, tiles, scheduler)
         diagnostics = diagnostics.noting(note)
     field = Field(Band(grid, blocks, width), values, diagnostics, confidence=confidence, solid=solid, coarse=coarse)
     return cast("Field[Grid[Literal[3]]]", field)
@@ -335,7 +333,6 @@ def in_store(
     blocks: Blocks,
     tiles: list[Ints],
     scheduler: Scheduler,
-    progress: Progress | None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float16], TilesComputed]:
     """Compute the unfinished tiles of a band in files of a folder.
 
@@ -358,8 +355,7 @@ def in_store(
     _begin(folder, key, plan, len(blocks), len(tiles))
     missing = np.flatnonzero(np.load(folder / "done.npy") == 0).tolist()
     for count, _ in enumerate(_computed(str(folder), key, missing, scheduler)):
-        if progress is not None:
-            progress((len(tiles) - len(missing) + count + 1) / len(tiles), "tiles")
+        report((len(tiles) - len(missing) + count + 1) / len(tiles), "tiles")
     values, confidence = (np.load(folder / f"{name}.npy", mmap_mode="c") for name in ("values", "confidence"))
     return values, confidence, TilesComputed(len(tiles), len(tiles) - len(missing))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from ..diagnostics import IntrinsicTriangles
 from ..discretization import discretize
 from ..errors import GeometryError, SignedHeatError, quoted
-from ..jobs import Progress
+from ..jobs import bound_progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
 from .intrinsic_triangulation import LARGEST_ANGLE, IntrinsicTriangulation, intrinsic_delaunay
 from .source_segments import CurveGroups
@@ -50,12 +50,11 @@ class Retriangulated:
     """A mesh that `adapt` discretises by an intrinsic triangulation for given sources; fields are on the mesh."""
 
     mesh: TriangleMesh
-    progress: Progress | None = field(default=None, repr=False)
     coarsest: ClassVar[float] = COARSEST_TRIANGLE
 
     def adapt(self, sources: Sequence[Any]) -> tuple[SurfaceDiscretization, Sequence[Any]]:
         """Refine the mesh intrinsically with the sources along edges; return the discretisation, and sources on it."""
-        return refined(self.mesh, self.progress, sources, coarsest=self.coarsest).adapt(sources)
+        return refined(self.mesh, sources, coarsest=self.coarsest).adapt(sources)
 
 
 class RetriangulatedForZeroSet(Retriangulated):
@@ -77,14 +76,14 @@ class RetriangulatedForZeroSet(Retriangulated):
         return replace(surface, spacing=smaller, unturned=None), groups
 
 
-def lowered_by_angles(domain: Any, progress: Progress | None = None) -> Any:
+def lowered_by_angles(domain: Any) -> Any:
     """Discretise a domain, as ``intrinsic="auto"`` does: meshes with many large or small angles are refined.
 
     They are not refined if faces are too thin for that.
     """
     if isinstance(domain, TriangleMesh) and is_spoiled(domain):
         try:
-            return refined(domain, progress, angle=AUTO_ANGLE)
+            return refined(domain, angle=AUTO_ANGLE)
         except GeometryError:
             pass
     return discretize(domain)
@@ -109,7 +108,6 @@ def is_spoiled(mesh: TriangleMesh) -> bool:
 
 def refined(
     mesh: TriangleMesh,
-    progress: Progress | None = None,
     keep: Sequence[Any] = (),
     angle: float = 28.0,
     coarsest: float = COARSEST_TRIANGLE,
@@ -120,7 +118,7 @@ def refined(
     """
     # refinement only adds triangles
     refuse_too_many(mesh.n_faces, mesh.n_faces, "triangles", more=BYTES_PER_REFINED * mesh.n_faces)
-    domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=progress)
+    domain = intrinsic_delaunay(mesh, keep, refine=True, angle=angle, coarsest=coarsest, progress=bound_progress())
     refuse_too_many(domain.n_faces, domain.n_faces, "triangles")
     return lowered(domain, domain=mesh, restriction=mesh.places, triangulation=domain)
 

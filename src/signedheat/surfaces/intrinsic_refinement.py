@@ -13,7 +13,7 @@ import numpy as np
 
 from ..arrays import Bools, Complexes, Floats, Ints
 from ..compiled import compiled
-from ..jobs import Progress, within
+from ..jobs import report
 from ..mesh.gluing import (
     N_EDGES,
     N_FACES,
@@ -41,9 +41,7 @@ TO_GROW = ("stack", "stacked", "next_face", "listed", "segment", "on_segment", "
 """Names of the arrays that grow with the triangulation: of a `Gluing`, per face and per edge, and of an `Agenda`."""
 
 
-def refine_all(
-    gluing: Gluing, angle: float, coarsest: float, max_vertices: int, progress: Progress | None = None
-) -> tuple[Gluing, Ints, Bools, bool]:
+def refine_all(gluing: Gluing, angle: float, coarsest: float, max_vertices: int) -> tuple[Gluing, Ints, Bools, bool]:
     """Refine a Delaunay triangulation, in place, until no face is thin, then none large: see `intrinsic_delaunay`.
 
     Return the triangulation, the (e,) fixed edges of the input that edges are part of, or −1, the result of
@@ -51,11 +49,11 @@ def refine_all(
     """
     segments, agenda = agenda_of(gluing)
     goal = Goal(np.tan(angle / 2) ** 2, np.inf, max_vertices)
-    gluing, agenda, status = refined(gluing, agenda, goal, progress)
+    gluing, agenda, status = refined(gluing, agenda, goal)
     if status == REFINED and coarsest < np.inf:
         mean_radius = float(np.sqrt(4 / 27**0.5 * lay_out(gluing).face_areas.mean())) / gluing.unit
         goal = goal._replace(radius=coarsest * mean_radius)
-        gluing, agenda, status = refined(gluing, agenda, goal, within(progress, 1.0, 1.0))  # the callback may cancel
+        gluing, agenda, status = refined(gluing, agenda, goal)
     n_edges = int(gluing.counts[N_EDGES])
     origin = np.full(n_edges, -1)
     fixed = np.flatnonzero(gluing.fixed[:n_edges])
@@ -63,7 +61,7 @@ def refine_all(
     return gluing, origin, close_faces(gluing, agenda), status != LIMIT_REACHED
 
 
-def refined(gluing: Gluing, agenda: Agenda, goal: Goal, progress: Progress | None) -> tuple[Gluing, Agenda, int]:
+def refined(gluing: Gluing, agenda: Agenda, goal: Goal) -> tuple[Gluing, Agenda, int]:
     """Refine until the goal or the vertex limit is reached; return both arguments, perhaps longer, and why it ended.
 
     That is one of the results of `refine`.
@@ -73,9 +71,9 @@ def refined(gluing: Gluing, agenda: Agenda, goal: Goal, progress: Progress | Non
     done = 0.0
     while True:
         status = refine(gluing, agenda, goal, 5000)  # vertices take some hundredths of a second
-        if status == PAUSED and progress is not None:
+        if status == PAUSED:
             done = max(done, float(listed[-1] - agenda.seen[1]) / len(listed))
-            progress(min(done, 1.0), "refine")
+            report(min(done, 1.0), "refine")
         if status == ARRAYS_FULL:
             grown: dict[str, Any] = {k: doubled(getattr(gluing, k)) for k in (*PER_FACE, *PER_EDGE, "steps", "weights")}
             gluing = gluing._replace(**grown)

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..errors import GeometryError, counted
 from ..fields.field_domain import Exact
-from ..jobs import Progress, Stopwatch, within
+from ..jobs import Progress, Stopwatch
 from ..mesh.curve_segments import CurveSegments, without_straight_nodes
 from ..mesh.gluing import N_STEPS, flip_all, glue, lay_out
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -524,7 +524,7 @@ def intrinsic_delaunay(
         max_vertices = whole_number(max_vertices, "max_vertices", 1)
     if not (isinstance(coarsest, float) and coarsest == np.inf):
         coarsest = finite_number(coarsest, "coarsest", 1, GeometryError)
-    stopwatch = Stopwatch(progress, steps=3)
+    stopwatch = Stopwatch(steps=3)
     with stopwatch("embed curves"):
         base = mesh.intrinsic
         refuse_other_area(mesh, base)
@@ -538,9 +538,8 @@ def intrinsic_delaunay(
         close = np.zeros(refinement.triangles.n_faces, dtype=bool)
     with stopwatch("refine"):
         if refine:
-            inner = within(progress, 2 / 3, 1.0)
             limit = 20 * refinement.triangles.n_vertices + 10_000 if max_vertices is None else max_vertices
-            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), coarsest, limit, inner)
+            gluing, origin, close, complete = refine_all(gluing, np.radians(angle), coarsest, limit)
             marked = np.append(marked, False)[origin]
     n = int(gluing.counts[N_STEPS])
     triangles = lay_out(gluing)

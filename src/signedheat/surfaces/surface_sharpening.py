@@ -5,7 +5,7 @@ Closed curves decide the sides of the surface by themselves, without heat.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
@@ -16,9 +16,8 @@ from ..diagnostics import GeodesicWindows, Note, SharpenedToCurves
 from ..discretization import SourceTerm, discretize
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, percent, warn_user
 from ..fields.field import Field
-from ..geodesics.exact_distance import Report, cleared, distance_to_segments, distance_to_zero_line, window_limit
+from ..geodesics.exact_distance import cleared, distance_to_segments, distance_to_zero_line, window_limit
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares, zero_line
-from ..jobs import Progress
 from ..mesh.components import connected_components
 from ..mesh.curve_segments import CurveSegments, interpolation_at
 from ..mesh.intrinsic_mesh import IntrinsicMesh
@@ -56,12 +55,11 @@ def _(
     field: Field[SurfaceDomain],
     source: CurvesAndPoints | None,
     method: Method | None,
-    progress: Progress | None,
 ) -> Field[SurfaceDomain]:
     """Sharpen a field on a surface; with a finer field, that is sharpened, and its first values are used."""
     if field.finest is not field:
         same = replace(field.finest, diagnostics=field.diagnostics)
-        fine = sharpen_on(same.domain, same, source, method, progress)
+        fine = sharpen_on(same.domain, same, source, method)
         values = fine.values[: len(field.values)]
         return replace(field, values=values, diagnostics=fine.diagnostics, finer=fine)
     surface = discretize(field.domain)
@@ -71,7 +69,7 @@ def _(
             element="field",
         )
     elements = LinearElements.on_triangles(surface.triangles)
-    new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), source, method, progress)
+    new, diagnostics = sharpened(field, surface, elements, at_triangles(surface, field), source, method)
     return replace(field, values=new[surface.restriction], diagnostics=diagnostics)
 
 
@@ -96,26 +94,25 @@ def _(
     source: SourceTerm | None,
     given: CurvesAndPoints | None,
     tolerance: float,
-    report: Callable[[], None] | None,
 ) -> Nearest:
     """Measure distance to `given` curves, and to the zero set of φ where it completes oriented ones.
 
     Without any, distance is that to the zero set, and to unoriented curves and points from which φ was computed.
     `values`, (n,), are φ at the vertices of the triangles, NaN where it is unknown. `tolerance` is the largest change
     of a distance, relative to the length of an edge, by which windows on the edge may be merged. Returns (n,) unsigned
-    distances, and the signs that the curves decide. `report` is called now and then, and may raise to cancel.
+    distances, and the signs that the curves decide.
     """
     if given is None:
-        return nearest_zero(surface, values, source, tolerance, report)
+        return nearest_zero(surface, values, source, tolerance)
     curves, _left_out = given_curves(surface.domain, as_list(given))
     parts = list(chain.from_iterable(surface.segments(curves)))
     if not parts:
         raise SourceError("there are no curves to sharpen to", remedy="leave them out", element="curves")
-    return nearest_curve(surface.triangles, values, parts, surface.spacing, tolerance, report)
+    return nearest_curve(surface.triangles, values, parts, surface.spacing, tolerance)
 
 
 def nearest_zero(
-    surface: SurfaceDiscretization, values: Floats, source: SourceTerm | None, tolerance: float, report: Report | None
+    surface: SurfaceDiscretization, values: Floats, source: SourceTerm | None, tolerance: float
 ) -> Nearest:
     """Measure distance to the zero set of φ, and to the unoriented curves and points that φ was computed from.
 
@@ -126,12 +123,10 @@ def nearest_zero(
     unsided = [part for part in source.parts if not part.oriented] if isinstance(source, SurfaceSource) else []
     sides = np.zeros(len(values), dtype=np.int64)
     if not isinstance(source, SurfaceSource) or not unsided:
-        distance, windows = distance_to_zero_line(surface.triangles, values, tolerance, report)
+        distance, windows = distance_to_zero_line(surface.triangles, values, tolerance)
         return Nearest(distance, sides, (note_on_searches(surface.triangles, windows),))
     # Unoriented curves run along edges of refined triangles, whose first vertices are those of the surface.
-    near, windows = distance_to_segments(
-        source.triangles, PlacedSegments.of(source.triangles, unsided), tolerance, report
-    )
+    near, windows = distance_to_segments(source.triangles, PlacedSegments.of(source.triangles, unsided), tolerance)
     note = note_on_searches(source.triangles, windows)
     near = near[: len(values)]
     if not source.oriented:
@@ -142,7 +137,7 @@ def nearest_zero(
     lines = without_false_zeros(
         surface.triangles, values, near < FALSE_ZERO_WIDTH * surface.spacing, sided[sided < len(values)]
     )
-    distance, more = distance_to_zero_line(surface.triangles, lines, tolerance, report)
+    distance, more = distance_to_zero_line(surface.triangles, lines, tolerance)
     also = note_on_searches(surface.triangles, more)
     both = GeodesicWindows(windows + more, note.cut_short or also.cut_short)
     return Nearest(np.minimum(near, distance), sides, (both,))
@@ -154,7 +149,6 @@ def nearest_curve(
     parts: Sequence[CurveSegments],
     spacing: float,
     tolerance: float,
-    report: Report | None,
 ) -> Nearest:
     """Measure distance to curves and points, and to the zero set of φ where it completes oriented curves.
 
@@ -162,26 +156,24 @@ def nearest_curve(
     """
     placed = PlacedSegments.of(triangles, parts)
     if not any(part.oriented for part in parts):
-        distance, windows = distance_to_segments(triangles, placed, tolerance, report)
+        distance, windows = distance_to_segments(triangles, placed, tolerance)
         return Nearest(distance, np.ones(len(values), dtype=np.int64), (note_on_searches(triangles, windows),))
     sides = curve_sides(triangles, placed)
     bounded = sides.regions != 0
     # What is missing, and which side is which, is decided near the curves: a short search is enough.
     size = float(np.sqrt(2 * triangles.face_areas.max()))
     reach = max(3 * size, float(sides.reach[np.isfinite(sides.reach)].max(initial=0.0)) * (1 + 1e-9))
-    near, windows = distance_to_segments(triangles, placed, tolerance, report, reach)
+    near, windows = distance_to_segments(triangles, placed, tolerance, reach)
     counts = [windows]
     is_near = sides.reach <= near * (1 + 1e-9)
     side = np.where(bounded, sides.regions, np.where(is_near, sides.nearby, 0))
     contradicts = (side != 0) & (np.sign(values) != side) & ~np.isnan(values)
     values = np.where(contradicts, np.copysign(np.minimum(near, reach), side), values)
-    missing, more = missing_parts(triangles, values, parts, placed, near, sides, spacing, report, reach)
+    missing, more = missing_parts(triangles, values, parts, placed, near, sides, spacing, reach)
     counts += more
     completed = float(missing.lengths.sum())
     # A path from a bounded region to what is missing elsewhere crosses a curve, so that one search is enough.
-    distance, windows = distance_to_segments(
-        triangles, placed.joined(missing) if completed > 0 else placed, tolerance, report
-    )
+    distance, windows = distance_to_segments(triangles, placed.joined(missing) if completed > 0 else placed, tolerance)
     counts.append(windows)
     there_length = sum(float(part.lengths.sum()) for part in parts)
     share = completed / (completed + there_length or 1.0)
@@ -197,9 +189,7 @@ def nearest_curve(
     return Nearest(distance, side, (note, note_on_searches(triangles, *counts)))
 
 
-def distance_without_heat(
-    source: SurfaceSource, tolerance: float, report: Report | None
-) -> tuple[Floats, tuple[Note, ...]] | None:
+def distance_without_heat(source: SurfaceSource, tolerance: float) -> tuple[Floats, tuple[Note, ...]] | None:
     """Measure signed distance to curves that decide the sides of all vertices: (n,) values, and notes.
 
     None if they do not decide all. The values are those of `nearest_curve`, which then needs no φ.
@@ -216,7 +206,7 @@ def distance_without_heat(
         if (reached & (side == 0) & ~on_curves(triangles, placed)).any():
             return None
         decided = (SharpenedToCurves(0.0, 0, float((side != 0).mean())),)
-    distance, windows = distance_to_segments(triangles, placed, tolerance, report)
+    distance, windows = distance_to_segments(triangles, placed, tolerance)
     signed = np.where(side < 0, -distance, distance)
     signed[np.isinf(distance)] = np.nan  # vertices without faces, and on other parts
     return signed, (*decided, note_on_searches(triangles, windows))
@@ -236,7 +226,6 @@ def missing_parts(
     distance: Floats,
     sides: CurveSides,
     spacing: float,
-    report: Report | None,
     reach: float,
 ) -> tuple[PlacedSegments, list[int]]:
     """Find the parts of the zero set of φ that complete the curves, as segments, and the window counts of searches.
@@ -251,7 +240,7 @@ def missing_parts(
     counts = []
     if len(sides.free_ends):
         ends = CurveSegments.of_points(placed.nodes[sides.free_ends])
-        to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, report, reach)
+        to_ends, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, [ends]), ROUGHLY, reach)
         counts.append(windows)
         beyond = to_ends <= distance * (1 + 1e-3)
         may_miss |= beyond[corners].all(axis=1)
@@ -261,7 +250,7 @@ def missing_parts(
     unsided = [part for part in parts if not part.oriented]
     if unsided:
         width = FALSE_ZERO_WIDTH * spacing
-        near, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, unsided), ROUGHLY, report, width)
+        near, windows = distance_to_segments(triangles, PlacedSegments.of(triangles, unsided), ROUGHLY, width)
         sided = [incident_faces(triangles, part.nodes)[1] for part in parts if part.oriented]
         values = without_false_zeros(triangles, values, near < width, corners[np.concatenate(sided)].ravel())
         counts.append(windows)

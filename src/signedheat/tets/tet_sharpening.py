@@ -9,7 +9,7 @@ anywhere on an edge, they are too long by an error of second order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -22,7 +22,7 @@ from ..discretization import SourceTerm
 from ..errors import SourceError
 from ..fields.field import Field
 from ..geodesics.heap_kernels import Queue, pop, push
-from ..jobs import Progress, run_cancellable
+from ..jobs import run_cancellable
 from ..mesh.components import grouped
 from ..methods import LinearElements, Method, Nearest, nearest, sharpen_on, sharpened
 from ..search.face_tree import FaceFeatures, FaceTree
@@ -42,15 +42,13 @@ completes the shape."""
 
 
 @sharpen_on.register
-def _(
-    mesh: TetMesh, field: Field[TetMesh], source: Shapes | None, method: Method | None, progress: Progress | None
-) -> Field[TetMesh]:
+def _(mesh: TetMesh, field: Field[TetMesh], source: Shapes | None, method: Method | None) -> Field[TetMesh]:
     """Sharpen a field on a tet mesh, to the zero set and to the faces of `source` if there is one."""
     lowered = lowered_tets(mesh)  # nothing is solved on it
     elements = LinearElements.on_tets(mesh.geometry, lowered.unknowns, lowered.n_unknowns)
     given = None if source is None else as_shapes(source)
     values = field.values[lowered.vertices]
-    new, diagnostics = sharpened(field, lowered, elements, values, given, method, progress)
+    new, diagnostics = sharpened(field, lowered, elements, values, given, method)
     return replace(field, values=lowered.at_vertices(new), diagnostics=diagnostics)
 
 
@@ -61,7 +59,6 @@ def _(
     source: SourceTerm | None,
     given: Sequence[SurfaceShape] | None,
     tolerance: float,
-    report: Callable[[], None] | None,
 ) -> Nearest:
     """Measure any-angle distance to the given faces, and to the zero set where it is over `FACE_EDGES` from all.
 
@@ -87,7 +84,7 @@ def _(
         """Return the results of `_distance_around`."""
         return _distance_around(lowered, points, values, positions, corners, owners)
 
-    distances, triangles, hidden = run_cancellable(measured, report)
+    distances, triangles, hidden = run_cancellable(measured)
     if features is not None:
         near = face_tree.search(points)
         decided = near.regular & (near.distances < FACE_EDGES * lowered.spacing)
