@@ -112,6 +112,7 @@ class Chain(Frozen):
         pairs = pair_halfedges(tails, heads, len(self.positions), np.repeat(used, 3))
         one, two = (np.flatnonzero(pairs.counts == count) for count in (1, 2))
         alone, first, second = pairs.first[one], pairs.first[two], pairs.second[two]
+        # at edges of more than two, by the angle around the edge at which each triangle lies
         crowded = np.flatnonzero(pairs.around > 2)
         along = unit(self.positions[heads[crowded]] - self.positions[tails[crowded]])
         along *= np.where(tails < heads, 1.0, -1.0)[crowded, None]  # from the lower vertex to the higher
@@ -123,6 +124,7 @@ class Chain(Frozen):
         starts = np.append(0, np.cumsum(np.bincount(edges, minlength=len(pairs.counts))))
         onward = next_in_groups(starts)
         gaps = np.where(onward <= np.arange(len(onward)), 2 * np.pi, 0.0) + angles[onward] - angles
+        # where angles are equal, by component, and in the opposite order on the other side of the plane
         if (gaps <= ANGLE_ROUNDING).any():
             levels = _levels(gaps, onward, edges)
             upwards = (np.cross(along, into)[order] @ ANY_DIRECTION > 0) * 2 - 1
@@ -170,10 +172,11 @@ def _levels(gaps: Floats, onward: Ints, edges: Ints) -> Ints:
 
     `gaps` are the angles to the next halfedge, `onward` its index, and `edges` the edge of each, in sorted order.
     """
-    begins = np.empty(len(gaps), dtype=bool)
+    begins = np.empty(len(gaps), dtype=bool)  # whether a new level begins with this halfedge
     begins[onward] = gaps > ANGLE_ROUNDING
     levels = np.cumsum(begins)
-    first = np.append(True, edges[1:] != edges[:-1])
-    before = np.maximum.accumulate(np.where(first, levels - begins, 0))
-    last = levels[np.append(np.flatnonzero(first)[1:], len(levels)) - 1]
-    return np.where(levels == before, last[np.cumsum(first) - 1], levels)
+    is_first = np.append(True, edges[1:] != edges[:-1])
+    before = np.maximum.accumulate(np.where(is_first, levels - begins, 0))  # last level of the edge before
+    last = levels[np.append(np.flatnonzero(is_first)[1:], len(levels)) - 1]
+    # the first of an edge that begin no level are at the angle of the last ones, across 2π
+    return np.where(levels == before, last[np.cumsum(is_first) - 1], levels)

@@ -75,6 +75,7 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: PointTree
     size = reach / STRIP_SAMPLES
     near_rim = np.sort(tree.meeting(np.stack([rim.mins, rim.maxes, rim.maxes])[None], reach)[1])
     triangles, patches = triangles[near_rim], patches[near_rim]
+    # triangles that are not small enough are divided in four, until all are, or there are too many
     parts, labels, count = [np.zeros((0, 3, 3))], [np.zeros(0, dtype=np.int64)], 0
     while len(triangles):
         centres = triangles.mean(axis=1)
@@ -112,7 +113,7 @@ def continuation(lid: Lid, samples: RimSamples, patches: Ints, width: float) -> 
     window = max(1, min(n // 4, round(reach / side_lengths(loop).mean())))  # points on each side over which to smooth
     tangents = unit(np.roll(loop, -window, axis=0) - np.roll(loop, window, axis=0))
     normals, slopes, frames, enough = _normals_at_rim(samples, loop, tangents, patches, reach)
-    outwards = unit(np.cross(normals, tangents))
+    outwards = unit(np.cross(normals, tangents))  # across the rim, in the surface
     bends = width * (slopes[:, 0] * outwards).sum(axis=1)  # k W
     needed = 2.0 * (outwards * vertex_normals(lid)[:n]).sum(axis=1)  # 2 sin β
     less, more = np.minimum(np.abs(bends), np.abs(needed)), np.maximum(np.abs(bends), np.abs(needed))
@@ -137,11 +138,12 @@ def _normals_at_rim(
     (n, 2, 3) derivatives of the normal along two directions, (n, 2, 3) these directions, across and along the rim, and
     (n,) whether there are enough samples; without, normals are 0.
     """
+    # weighted means over the samples near each point
     n = len(loop)
     rows, near, distances = _within(samples, loop, patches, reach)
     weights = samples.areas[near] * (1.0 - (distances / reach) ** 2)  # falls to 0 at the reach
     weights /= np.maximum(np.bincount(rows, weights, n), 1e-300)[rows]
-    means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))  # over samples near each point
+    means = sparse.csr_array((weights, (rows, near)), shape=(n, len(samples.areas)))
     positions, corners = samples.positions - loop[0], loop - loop[0]
     mean_normals, mean_positions = means @ samples.normals, means @ positions
 
@@ -155,6 +157,7 @@ def _normals_at_rim(
     across = unit(across)
     frames = np.stack([across, unit(np.cross(mean_normals, across))], axis=1)
     offsets = np.einsum("nij,nj->ni", frames, mean_positions - corners)
+    # least squares with a ridge: the covariance of normals over that of positions in the frame
     spread = frames @ covariance(positions) @ frames.transpose(0, 2, 1) + (HALF_BENDING_DEPTH * reach) ** 2 * np.eye(2)
     slopes = np.linalg.solve(spread, frames @ covariance(samples.normals))
     normals = unit(mean_normals - np.einsum("ni,nij->nj", offsets, slopes)) * enough[:, None]
@@ -209,7 +212,8 @@ def _least_bent(
 
     The (n, 3) corners, (n,) ids of vertices and (n, 3) normals are given loop by loop, from (h + 1,) `starts` on. No
     diagonal may have one of the sorted keys `taken`. In the body, `cost[i, j]` is the bend of the best lid between
-    corners i and j, and `rims[i, j]` the sum of lengths times squared angles where this lid meets the rim.
+    corners i and j, and `rims[i, j]` the sum of lengths times squared angles where this lid meets the rim. Such a lid
+    is a triangle i, k, j and the best lids between i and k and between k and j.
     """
     n_loops = len(starts) - 1
     faces, closed = np.empty((len(corners) - 2 * n_loops, 3), dtype=np.int64), np.zeros(n_loops, dtype=np.bool_)
@@ -229,6 +233,7 @@ def _least_bent(
             if i < n - 1:
                 cost[i, i + 1] = rims[i, i + 1] = 0.0
                 across[i, i + 1] = normals[begin + i]
+        # the best lids between corners that are farther and farther apart
         for span in range(2, n):
             for i in range(n - span):
                 j = i + span
@@ -253,6 +258,7 @@ def _least_bent(
                             rims[i, j] += length_before * before**2
                         if k == j - 1:
                             rims[i, j] += length_behind * behind**2
+        # the whole loop, whose last edge is from corner n − 1 to 0, and its triangles
         last = _length(points[n - 1], points[0])
         bend = rims[0, n - 1] + last * _angle(across[0, n - 1], normals[begin + n - 1]) ** 2
         closed[h] = cost[0, n - 1] < np.inf and bend <= most**2 * perimeter
@@ -333,12 +339,13 @@ class _Surface(Frozen):
 
     vertices: Floats  # (n, 3)
     faces: Ints  # (m, 3)
-    outlines: Ints = field(default_factory=lambda: NO_EDGES)
+    outlines: Ints = field(default_factory=lambda: NO_EDGES)  # (k, 2) boundary edges that stay open
 
     @cached_property
     def loops(self) -> list[Ints]:
         """Vertices of each closed loop of boundary edges that are not outlines."""
         edges, n = boundary(self.faces), len(self.vertices)
+        # outlines are taken out one by one, since an edge may be there several times
         keys, left = edges @ [n, 1], np.sort(self.outlines @ [n, 1])
         order, copies = np.argsort(keys, kind="stable"), np.arange(len(left)) - np.searchsorted(left, left)
         edges = np.delete(edges, order[np.searchsorted(keys[order], left) + copies], axis=0)
@@ -424,6 +431,7 @@ def small_lids(vertices: Floats, faces: Ints, bent: bool = True, outlines: Ints 
     surface = _Surface(vertices, faces, outlines)
     if not surface.loops:
         return np.empty((0, 3), dtype=np.int64)
+    # loops with a corner or two enclose nothing; those with few corners are tried
     triangles, chosen, corners, normals = [np.empty((0, 3), dtype=np.int64)], [], [], []
     starts = np.cumsum([0, *map(len, surface.loops)])
     tails, following = np.concatenate([*surface.loops, starts[:0]]), next_in_groups(starts)

@@ -187,22 +187,23 @@ def _holes(around: Rims, lengths: Floats, faces: Ints, decided: Bounding, used: 
     `around` are the vertices of l loops with (l,) lengths, along (m, 3) `faces`, which are triangles `used` of the
     chain that was decided about.
     """
-    keys = (faces << 32 | np.roll(faces, -1, axis=1)).ravel()
+    keys = (faces << 32 | np.roll(faces, -1, axis=1)).ravel()  # of halfedges, tail and head in one number
     order = np.argsort(keys, kind="stable")
     keys = keys[order]
     bounds, scraps = decided.counts != 0, decided.loose >= 0
-    longest: dict[int, int] = {}
-    chosen, single = np.zeros(len(around), dtype=bool), np.full(len(around), -1)
+    longest: dict[int, int] = {}  # the longest loop of each piece
+    of_body, of_one_piece = np.zeros(len(around), dtype=bool), np.zeros(len(around), dtype=bool)
     for k, loop in enumerate(around):
+        # a loop runs against the halfedges of the faces behind it
         behind = used[order[np.searchsorted(keys, np.roll(loop, -1) << 32 | loop)] // 3]
         pieces = np.unique(decided.pieces[behind]).tolist()
-        chosen[k] = bounds[behind].all() and not scraps[behind].all()
-        single[k] = pieces[0] if len(pieces) == 1 else -1
+        of_body[k] = bounds[behind].all() and not scraps[behind].all()
+        of_one_piece[k] = len(pieces) == 1
         for piece in pieces:
             if piece not in longest or lengths[k] > lengths[longest[piece]]:
                 longest[piece] = k
     outlines = np.isin(np.arange(len(around)), list(longest.values()))
-    return chosen | ((single >= 0) & ~outlines)
+    return of_body | (of_one_piece & ~outlines)
 
 
 def _through(around: Rims, vertices: Floats, named: Ints) -> Bools:
@@ -228,7 +229,7 @@ def _as_neighbours(faces: Ints, turned: Bools, added: Ints) -> Ints:
     table = edge_table(np.concatenate([faces, added]))
     signs = np.where(turned, -1, 1)
     votes = np.bincount(table.face_edges[: len(faces)].ravel(), np.repeat(signs, 3), len(table.vertices))
-    own = table.face_edges[len(faces) :]
-    parts = element_components(own)
-    flipped = np.bincount(np.repeat(parts, 3), votes[own.ravel()])[parts] < 0
+    added_edges = table.face_edges[len(faces) :]
+    parts = element_components(added_edges)
+    flipped = np.bincount(np.repeat(parts, 3), votes[added_edges.ravel()])[parts] < 0
     return np.where(flipped[:, None], added[:, ::-1], added)

@@ -175,6 +175,7 @@ def points_inside(polygon: Floats) -> Floats:
     """(k, 2) points within a polygon of few sides, as dense as its corners near them, and sparser farther inside."""
     steps = side_lengths(polygon)
     size = float(np.quantile(steps, 0.9))
+    # layers of triangular grids, each coarser than the one before
     low, high = polygon.min(axis=0), polygon.max(axis=0)
     tree = PointTree(polygon)
     layers = [np.zeros((0, 2))]
@@ -256,6 +257,7 @@ def _in_polygon(shares: Floats, points: Floats) -> Floats:
     place = np.arctan2(points[:, 1], points[:, 0]) / (2 * np.pi) % 1.0
     corners = np.append(shares, shares[0] + 1.0)
     turns = (place - shares[0]) % 1.0 + shares[0]
+    # a side is a chord of the circle: at its middle, it is cos(π · its share) from the centre
     side = np.clip(np.searchsorted(corners, turns, side="right") - 1, 0, len(shares) - 1)
     half, middle = 0.5 * (corners[side + 1] - corners[side]), 0.5 * (corners[side] + corners[side + 1])
     return points * (np.cos(2 * np.pi * half) / np.cos(2 * np.pi * (turns - middle)))[:, None]
@@ -311,6 +313,7 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
     if n == len(lid.vertices):
         return lid
     rim = lid.vertices[:n]
+    # rest: m κ without m; load: the terms with g
     rest, load = _extended(stiffness(lid), held * curvatures), _load(rim, normals)
     lengths = side_lengths(rim)
     springs = (1.0 / np.maximum(held, 1e-9) - 1.0) * 0.25 * width * 0.5 * (lengths + np.roll(lengths, 1))

@@ -70,7 +70,7 @@ def _among_few(corners: Floats, starts: Ints, counts: Ints, faces: Ints, groups:
     Triangles have (m, 9) `corners`, group by group from `starts` on, and (m,) `counts`.
     """
     levels = np.zeros(len(faces))
-    for row in range(len(faces)):
+    for row in range(len(faces)):  # without the face itself, whose level at its own centre is 0
         i, group = faces[row], groups[row]
         x = (corners[i, 0] + corners[i, 3] + corners[i, 6]) / 3
         y = (corners[i, 1] + corners[i, 4] + corners[i, 7]) / 3
@@ -118,15 +118,16 @@ class Bodies:
 
         `alone` are the (p,) levels of pieces by themselves, `given` the (p,) area that faces as given, less the rest.
         """
+        # candidates: each piece that is a body by itself, and the rest of each group
         n = len(groups)
-        itself = np.abs(alone) >= SHEET
-        names, owners = np.unique(np.where(itself, n + np.arange(n), groups), return_inverse=True)
-        levels = levels_of_pieces(Pieces(directed, owners[pieces.labels]))
+        by_itself = np.abs(alone) >= SHEET
+        names, candidates = np.unique(np.where(by_itself, n + np.arange(n), groups), return_inverse=True)
+        levels = levels_of_pieces(Pieces(directed, candidates[pieces.labels]))
         chosen = np.flatnonzero(np.abs(levels) >= SHEET)
         numbers = np.full(len(names), -1)
         numbers[chosen] = np.arange(len(chosen))
-        net = np.bincount(owners, given)[chosen] * np.sign(levels[chosen])
-        return cls(numbers[owners], levels[chosen], net >= HINT * np.bincount(owners, pieces.areas)[chosen])
+        net = np.bincount(candidates, given)[chosen] * np.sign(levels[chosen])
+        return cls(numbers[candidates], levels[chosen], net >= HINT * np.bincount(candidates, pieces.areas)[chosen])
 
 
 def bodies_around(
@@ -156,19 +157,21 @@ def bodies_around(
         return np.zeros(n)
     numbers = bodies.numbers[pieces.labels]
     triangles = directed(triangles, np.sign(bodies.levels)[numbers])
+    # samples and points on rims, each at home in a body: its own, or that of the nearest point that has one
     points = np.concatenate([system.points, rims.middles])
     homes = bodies.numbers[np.concatenate([system.owners, rims.owners])]
-    own = homes >= 0
-    away = np.flatnonzero(~own)
-    if len(away):
-        homes[away] = homes[own][PointTree(points[own]).query(points[away])[1]]
+    has_own = homes >= 0
+    homeless = np.flatnonzero(~has_own)
+    if len(homeless):
+        homes[homeless] = homes[has_own][PointTree(points[has_own]).query(points[homeless])[1]]
     sizes = np.concatenate([system.areas, rims.lengths])
+    # all pairs of a point and a body in whose box it lies: indices of both, winding number, and home of the point
     order = np.argsort(numbers, kind="stable")
     parts = np.split(triangles[order], np.searchsorted(numbers[order], np.arange(count)))[1:]
     parts += [closed] * (len(closed) > 0)  # closed surfaces count as one more body
     rows, others, numbers_there = _windings(points, parts)
     homes_there = homes[rows]
-    weights = np.where(own, sizes, 0.0)
+    weights = np.where(has_own, sizes, 0.0)
     on_rim = np.arange(len(points)) >= n
 
     def mean(chosen: Bools, values: NDArray[Any], one: Ints, other: Ints) -> Floats:
@@ -178,6 +181,7 @@ def bodies_around(
         total = np.bincount(homes, weights * chosen, count + 1)
         return np.asarray(sums[one, other]).ravel() / np.maximum(total[one], np.finfo(float).tiny)
 
+    # how much of one body of each pair lies within the other decides whether they ignore each other
     full = 2 * np.abs(np.append(bodies.levels, 0.5))[others]
     share = np.clip(numbers_there / full, 0.0, 1.0)  # 1 inside, as if no part of the other body were missing
     surface_within = np.maximum(
@@ -188,6 +192,7 @@ def bodies_around(
     stays = {"given": bodies.as_given, "cavities": ~every, "bodies": every}[nested][homes_there]
     ignored = (homes_there != others) & ((united & not_nested) | (enclosed & stays))
     subtracted = np.where(others == count, enclosed & ~stays, ~ignored) & (rows < n)
+    # all bodies, without those that are not ignored
     everything = WindingTree.of(np.concatenate(parts[:count]))
     around = everything.levels(system.points)
     return around - np.bincount(rows[subtracted], numbers_there[subtracted], n)

@@ -56,6 +56,7 @@ def as_given(chain: Chain, reversed: Bools) -> Reading:
     if whole.all():
         every = np.ones(int(complexes.max(initial=-1)) + 1, dtype=bool)
         return Reading(counts, turned, complexes, every, 0, reversed, whole)
+    # pieces: whole complexes, and triangles that are connected where they run along an edge in opposite directions
     used = (counts != 0) & ~whole
     halfedges, next_halfedges = chain.neighbors(used)
     forward = chain.edges.forward.ravel() != np.repeat(counts < 0, 3)
@@ -69,7 +70,8 @@ def as_given(chain: Chain, reversed: Bools) -> Reading:
 def _closed_one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
     """(m,) whether the complex of each triangle is closed, (c,) `closes`, and faces outwards, or inwards, as a whole.
 
-    Levels of a closed complex are the same all over a piece, so that one triangle of each piece is enough.
+    Levels of a closed complex are the same all over a piece, so that one triangle of each piece is enough: the largest.
+    On a complex that faces outwards they are at least ½, and at most −½ if it faces inwards.
     """
     if not closes.any():
         return np.zeros(len(counts), dtype=bool)
@@ -79,8 +81,8 @@ def _closed_one_way(chain: Chain, counts: Ints, closes: Bools) -> Bools:
     largest = order[np.unique(parts[order], return_index=True)[1]]
     levels = levels_within(chain.triangles[chosen], chain.complexes[chosen], counts[chosen], largest)
     owners = chain.complexes[chosen[largest]]
-    ahead, back = (np.bincount(owners, sign * levels < 0.25, len(closes)) == 0 for sign in (1, -1))
-    return np.asarray((closes & (ahead | back))[chain.complexes])
+    outwards, inwards = (np.bincount(owners, sign * levels < 0.25, len(closes)) == 0 for sign in (1, -1))
+    return np.asarray((closes & (outwards | inwards))[chain.complexes])
 
 
 def once(chain: Chain) -> Reading:

@@ -113,6 +113,7 @@ def _windings(
     as −1. Across edges, numbers follow from each other, up to a constant for each connected part, which is sampled on
     its widest faces. Sides of wide faces are probed at least their (m,) steps away.
     """
+    # (m, 2) numbers up to a constant for each part, and (m,) the part of each face
     n = len(faces)
     sides, facing_sides = _around_edges(points, faces, normals, times)
     levels, labels, contradictions = _levels(times, sides, facing_sides)
@@ -127,7 +128,8 @@ def _windings(
     away, centres = away[:, None] * normals[chosen], corners.mean(axis=1)
     sampled = windings.numbers_once(np.concatenate([centres - away, centres + away]))
     offsets, owners = sampled.reshape(2, -1) - levels[chosen].T, labels[chosen]
-    # where the two sides disagree, another face lies between
+    # the constant is the median over the probed faces of a part, without those whose sides disagree about it, since
+    # another face lies between the points
     order = np.lexsort((offsets[0], np.abs(offsets[0] - offsets[1]) > 0.5, owners))
     counts = np.bincount(owners)
     agree = np.bincount(owners, np.abs(offsets[0] - offsets[1]) <= 0.5).astype(np.int64)
@@ -141,10 +143,12 @@ def _around_edges(points: Floats, faces: Ints, normals: Floats, times: Ints) -> 
     Side 2 f is behind face f, side 2 f + 1 in front of it. Boundary edges of open surfaces are left out, as nothing
     is known there. Directions across edges come from the planes of faces, so that thin triangles have them, too.
     """
+    # edges of two faces, which must run opposite ways
     table = edge_table(faces)
     halfedges = table.pairs[(_directions(table, table.pairs) * times[table.pairs // 3]).sum(axis=1) == 0]
     sides, facing_sides = _facing(table, halfedges.ravel(), halfedges[:, ::-1].ravel())
 
+    # edges of more faces, by their angles
     crowded = np.flatnonzero((table.face_counts > 2)[table.face_edges.ravel()])
     edges, around = np.unique(table.face_edges.ravel()[crowded], return_inverse=True)
     owners, ways, vertices = crowded // 3, _directions(table, crowded), table.vertices[edges]
@@ -186,13 +190,14 @@ def _levels(times: Ints, one: Ints, other: Ints) -> tuple[Ints, Ints, int]:
 
     Side 2 f is behind face f, and side 2 f + 1, in front of it, has a winding number smaller by the multiplicity
     `times` of the face. The pairs of sides `one` and `other` have equal ones; a pair that contradicts earlier pairs is
-    only counted.
+    only counted. This is union–find in which each node knows how much higher it is than its parent.
     """
     n, contradictions = 2 * len(times), 0
-    parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)  # levels relative to the parents
+    parents, rises = np.arange(n), np.zeros(n, dtype=np.int64)
     for face in range(len(times)):
         parents[2 * face + 1], rises[2 * face + 1] = 2 * face, -times[face]
     for k in range(len(one)):
+        # find both roots, shortening the paths; `rise` becomes the level of root b less that of root a, by this pair
         a, b, rise = one[k], other[k], 0
         while parents[a] != a:
             rises[a] += rises[parents[a]]

@@ -56,6 +56,7 @@ def loops(vertices: Floats, faces: Ints, edges: Ints) -> list[Ints]:
     """
     if not len(edges):
         return []
+    # the ends of edges around each vertex, in order of angle where there are more than two
     tails, heads = edges.T
     n_edges, n = len(edges), len(vertices)
     ends = np.concatenate([tails, heads])
@@ -91,7 +92,7 @@ def _across_gaps(starts: Ints, edges_around: Ints) -> Ints:
     following, waiting = np.full(len(edges_around) // 2, -1), np.empty(len(edges_around) // 2, dtype=np.int64)
     for v in range(len(starts) - 1):
         depth = 0
-        for turn in range(2):
+        for turn in range(2):  # the second time around, edges that arrive take those that still wait
             for k in range(starts[v], starts[v + 1]):
                 if edges_around[k] >= 0:
                     if turn == 0:
@@ -118,7 +119,7 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
         edge, depth = first, 0
         while True:
             begin = index_in_walk[tails[edge]] if depth else -1
-            if begin >= 0:
+            if begin >= 0:  # the walk from there on is a loop
                 for k in range(begin, depth):
                     edges[count] = walk[k]
                     index_in_walk[tails[walk[k]]] = -1
@@ -179,6 +180,7 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
     Edges are given by (n, 2, 3) ends; pairs are two (k,) arrays of their indices. Each sample point on an edge has one
     partner, which is nearest in position and direction. The time is O(n log n).
     """
+    # partners are searched for in position and direction at once; edges are grouped by reach, in powers of two
     directions, (points, owners) = unit(ends[:, 1] - ends[:, 0]), _points_on(ends)
     partners = np.full((len(ends), EDGE_POINTS), -1)
     sizes = np.exp2(np.ceil(np.log2(np.maximum(reaches, 1e-300))))
@@ -195,6 +197,7 @@ def opposite_edges(ends: Floats, reaches: Floats) -> tuple[Ints, Ints]:
             back = np.concatenate([points[rows] / size, -2.0 * directions[owners[rows]]], axis=1)
             near = tree.query(back, distance_upper_bound=2.0)[1]
             partners[edges] = np.where(near < len(points), near, -1).reshape(-1, EDGE_POINTS)
+    # kept are points within reach of the edge of their partner, which runs the opposite way
     partner = partners.ravel()
     first = np.flatnonzero(partner >= 0)
     edge, other = owners[first], owners[partner[first]]
@@ -233,6 +236,7 @@ def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
     is_open = np.flatnonzero((table.face_counts == 1) & in_surface)
     if not len(is_open):
         return mesh, np.arange(mesh.n_faces)
+    # pairs of an open edge and a face whose box it meets, and in whose plane it lies
     slacks = tolerances(points, faces, SAME_POINT)
     corners, ends = points[faces], table.vertices[is_open]
     owners = np.empty(len(table.vertices), dtype=np.int64)

@@ -145,6 +145,7 @@ def _cut(points: Floats, faces: Ints, closing: Bools, slacks: Floats) -> Arrange
     pieces = _arranged(points, faces, closing_ids, number[pairs[both]], slacks)
     if closing.all():
         return pieces
+    # the others, with the closing faces that they meet, of which the pieces are not used
     mixed = pairs[~both]
     is_involved = ~closing
     is_involved[mixed] = True
@@ -203,6 +204,7 @@ def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: F
     if not len(corners):
         confidence[added] = 0.5
         return confidence
+    # trust falls over a share of the size of the given part of the same surface
     surfaces = element_components(whole.ids)
     n = int(surfaces.max()) + 1
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
@@ -293,7 +295,8 @@ def _combination(a: Solid, b: Solid, subtracted: bool, around: Floats | None = N
 
     `around` are (k, 3, 3) triangles or None.
     """
-    (first, of_first), (second, of_second) = ((x.triangles[x.bounding], np.flatnonzero(x.bounding)) for x in (a, b))
+    of_first, of_second = (np.flatnonzero(solid.bounding) for solid in (a, b))
+    first, second = a.triangles[a.bounding], b.triangles[b.bounding]
     triangles = np.concatenate([first, second[:, ::-1] if subtracted else second])
     if not len(triangles):
         raise SourceError("neither shape encloses anything", remedy="combine solids, not sheets", element="solid")
@@ -305,6 +308,7 @@ def _combination(a: Solid, b: Solid, subtracted: bool, around: Floats | None = N
     kept = regions.bounds
     if not kept.any():
         raise SourceError("nothing is inside the result", remedy="check that the solids overlap", element="solid")
+    # faces of b are numbered after those of the mesh that a was made from
     pieces, parents = cut.points[cut.faces[kept]], cut.origins[kept]
     count = a.source.n_faces if a.source is not None else int(a.origins.max()) + 1
     origins = np.concatenate(

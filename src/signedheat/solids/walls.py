@@ -65,6 +65,7 @@ def seams(rims: list[Rim]) -> list[Ints]:
     """
     if not rims:
         return []
+    # all sides of all rims: (n,) rim of each, next side, ends, outward vector and part at its first edge
     corners = [corners_of(rim.corners) for rim in rims]
     counts = np.array([len(places) for places in corners])
     first = np.cumsum(counts) - counts
@@ -77,6 +78,7 @@ def seams(rims: list[Rim]) -> list[Ints]:
     lengths, directions = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1), unit(ends[:, 1] - ends[:, 0])
     longest = np.maximum.reduceat(lengths, first)
     reaches = np.maximum([rim.reach for rim in rims], ALONG_EDGE * longest)
+    # (k,) pairs of sides that run along each other: how far apart, and how far that way is onward from each surface
     first_sides, second_sides = opposite_edges(ends, reaches[owners])
     across = ends.mean(axis=1)[second_sides] - ends.mean(axis=1)[first_sides]
     across -= (across * directions[first_sides]).sum(axis=1)[:, None] * directions[first_sides]
@@ -90,6 +92,7 @@ def seams(rims: list[Rim]) -> list[Ints]:
     crack &= (parts[first_sides] != parts[second_sides]) | ((ahead >= 0) & (back >= 0))
     gap = crack | (np.minimum(ahead, back) >= SAME_WAY * width)
     first_sides, second_sides = first_sides[gap], second_sides[gap]
+    # a strip for each stretch, the longest first, unless longer ones have used its sides
     strips, used = [], np.zeros(n, dtype=bool)
     for pairs in _stretches(
         np.concatenate([first_sides, second_sides]), np.concatenate([second_sides, first_sides]), following, lengths
@@ -129,6 +132,7 @@ def _stretches(first: Ints, second: Ints, following: Ints, lengths: Floats) -> l
     keys = np.sort(first * n + second)
     first, second = np.divmod(keys, n)
     tails, heads = [], []
+    # a pair is linked with those that are one side further on one of the rims or on both, which run opposite ways
     for e, f in ((following[first], second), (first, preceding[second]), (following[first], preceding[second])):
         rows = np.minimum(np.searchsorted(keys, e * n + f), len(keys) - 1)
         linked = (keys[rows] == e * n + f) & ((e != second) | (f != first))
@@ -232,17 +236,17 @@ def _zipped(first_ids: Ints, first_points: Floats, second_ids: Ints, second_poin
 
     Each chain has ids and positions. Faces run along the first chain, and against the second.
     """
-    a, b, rows = 0, 0, []
+    a, b, triangles = 0, 0, []
     while a < len(first_ids) - 1 or b < len(second_ids) - 1:
         if b == len(second_ids) - 1 or (
             a < len(first_ids) - 1
             and np.linalg.norm(first_points[a + 1] - second_points[b])
             <= np.linalg.norm(first_points[a] - second_points[b + 1])
         ):
-            rows.append((first_ids[a], first_ids[a + 1], second_ids[b]))
+            triangles.append((first_ids[a], first_ids[a + 1], second_ids[b]))
             a += 1
         else:
-            rows.append((first_ids[a], second_ids[b + 1], second_ids[b]))
+            triangles.append((first_ids[a], second_ids[b + 1], second_ids[b]))
             b += 1
-    faces = np.array(rows)
+    faces = np.array(triangles)
     return np.asarray(faces[has_three_corners(faces)])
