@@ -244,6 +244,7 @@ def _with_crossings(
     """
     if not len(records.faces):
         return points, lines, records
+    # parts of lines as thin boxes, to find those near each other
     ends = np.stack([records.tails, records.heads], axis=1)
     corners = points[ends[:, [0, 1, 1]]]
     tree = BoxTree.around(corners)
@@ -279,45 +280,18 @@ def _divided(
 
     `origins`, (m,), are the given faces that the (m, 3) faces stand for, and `records` the parts of lines in faces.
     """
-    n_lines = len(lines.ends)
-    on = lines.on.along(points, lines.ends)
-    counts = np.bincount(on.owners, minlength=n_lines)
-    starts = np.append(0, np.cumsum(counts + 2))  # of the points of each line, including its ends
-    whole = np.empty(starts[-1], dtype=np.int64)
-    whole[starts[:-1]], whole[starts[1:] - 1] = lines.ends.T
-    rest = np.ones(len(whole), dtype=bool)
-    rest[starts[:-1]] = rest[starts[1:] - 1] = False
-    whole[rest] = on.points
-    line_of = np.repeat(np.arange(n_lines), counts + 2)
-
-    # split parts of lines in faces at every point
     n = len(points)
-    keys = line_of * n + whole
-    order = np.argsort(keys, kind="stable")
-    tails, heads = (
-        order[np.searchsorted(keys[order], records.lines * n + end)] for end in (records.tails, records.heads)
-    )
-    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    row, place = numbered(high - low)
-    place += low[row]
-    face, begins_at, ends_at = records.faces[row], whole[place], whole[place + 1]
-
-    busy: Bools = np.asarray(counts[table.face_edges].any(axis=1))
+    starts, along = _points_along(points, lines)
+    face, begins_at, ends_at = _split(records, starts, along, n)
+    busy: Bools = np.asarray((np.diff(starts) > 2)[table.face_edges].any(axis=1))
     busy[face] = True
     busy[lines.within.owners] = True
     chosen = np.flatnonzero(busy)
     if not len(chosen):
         return Arrangement(points, faces, origins, np.arange(len(faces)))
-    # the points on the boundary of each face, in order
-    edges, forward = table.face_edges[chosen].ravel(), table.forward[chosen].ravel()
-    side, place = members_of(starts, np.arange(starts[-1]), edges)
-    backwards = ~forward[side]
-    place = np.where(backwards, starts[edges[side]] + starts[edges[side] + 1] - 1 - place, place)
-    last = np.append(side[1:] != side[:-1], True)
-    side, rim = side[~last], whole[place][~last]
-    owner = chosen[side // 3]
-    corner = np.append(True, side[1:] != side[:-1])
+    owner, rim, corner = _rims(table, chosen, starts, along)
 
+    # points and segments inside faces, without those on the boundary
     inner = Incidence.of(lines.within, (face, begins_at), (face, ends_at)).without((owner, rim))
     segments = Incidence.of((face * n + np.minimum(begins_at, ends_at), np.maximum(begins_at, ends_at)))
     following = np.empty_like(rim)
@@ -328,6 +302,7 @@ def _divided(
     segments = segments.without((owner * n + np.minimum(rim, following), np.maximum(rim, following)))
     segment_faces, segment_tails = np.divmod(segments.owners, n)
 
+    # what `triangulate_faces` takes: all points of each face, the rim first, and segments between their local numbers
     members_owner = np.concatenate([owner, inner.owners])
     members = np.concatenate([rim, inner.points])
     order = np.argsort(members_owner, kind="stable")
@@ -350,6 +325,7 @@ def _divided(
         np.searchsorted(segment_faces, np.append(chosen, len(faces))),
         np.stack(corner_ends, axis=1),
     )
+    # pieces are in one cell if they are connected across edges that are no segments
     rows, sides = np.nonzero(across >= 0)
     cells = connected_components(len(pieces), rows, across[rows, sides])
     kept = np.flatnonzero(~busy)
@@ -360,11 +336,53 @@ def _divided(
     return Arrangement(points, all_faces[order], origins[all_origins[order]], all_cells[order])
 
 
+def _points_along(points: Floats, lines: Lines) -> tuple[Ints, Ints]:
+    """Return (l + 1,) offsets, and the points of each line in order, from its first end to its last."""
+    on = lines.on.along(points, lines.ends)
+    starts = np.append(0, np.cumsum(np.bincount(on.owners, minlength=len(lines.ends)) + 2))
+    along = np.empty(starts[-1], dtype=np.int64)
+    along[starts[:-1]], along[starts[1:] - 1] = lines.ends.T
+    between = np.ones(len(along), dtype=bool)
+    between[starts[:-1]] = between[starts[1:] - 1] = False
+    along[between] = on.points
+    return starts, along
+
+
+def _split(records: Records, starts: Ints, along: Ints, n: int) -> tuple[Ints, Ints, Ints]:
+    """Split parts of lines in faces at every point: (k,) faces, and (k,) points at the beginning and end of each.
+
+    `starts` and `along` are those of `_points_along`, on n points.
+    """
+    keys = np.repeat(np.arange(len(starts) - 1), np.diff(starts)) * n + along
+    order = np.argsort(keys, kind="stable")
+    tails, heads = (
+        order[np.searchsorted(keys[order], records.lines * n + end)] for end in (records.tails, records.heads)
+    )
+    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
+    row, place = numbered(high - low)
+    place += low[row]
+    return records.faces[row], along[place], along[place + 1]
+
+
+def _rims(table: EdgeTable, chosen: Ints, starts: Ints, along: Ints) -> tuple[Ints, Ints, Bools]:
+    """Return the points around the `chosen` faces in order: (k,) faces, (k,) points, and (k,) which are corners.
+
+    `starts` and `along` are those of `_points_along`; a side that runs against its edge takes them backwards.
+    """
+    edges, forward = table.face_edges[chosen].ravel(), table.forward[chosen].ravel()
+    side, place = members_of(starts, np.arange(starts[-1]), edges)
+    place = np.where(~forward[side], starts[edges[side]] + starts[edges[side] + 1] - 1 - place, place)
+    last = np.append(side[1:] != side[:-1], True)  # the next side begins with this point
+    side, rim = side[~last], along[place][~last]
+    return chosen[side // 3], rim, np.append(True, side[1:] != side[:-1])
+
+
 def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     """Give cells of different faces that cover each other the same triangles, those of the first cell.
 
     Triangles are reversed where a face has the opposite orientation.
     """
+    # the outline of each cell: the sides that it has once
     points, faces, origins, cells = pieces
     table = edge_table(faces)
     n = int(cells.max(initial=-1)) + 1
@@ -376,6 +394,7 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     twice[:-1] |= same
     outline = order[~twice]
     edges, owners = edges[outline], owners[outline]
+    # equal outlines have equal sums of the random codes of their edges (Zobrist 1970); the first such cell is the model
     codes = np.random.default_rng(0).integers(0, 2**63, len(table.vertices), dtype=np.int64).astype(np.uint64)
     sums, counts = np.zeros(n, dtype=np.uint64), np.bincount(owners, minlength=n)
     np.add.at(sums, owners, codes[edges])
@@ -387,12 +406,14 @@ def _with_copies_alike(pieces: Arrangement) -> Arrangement:
     models = first[kinds]
     if (models == np.arange(n)).all():
         return pieces
+    # cells cover each other if areas and centroids are equal, too
     areas, middles = face_areas(points[faces]), points[faces].mean(axis=1)
     totals = np.bincount(cells, areas, n)
     middles = sums_of(areas[:, None] * middles, cells, n) / np.maximum(totals, 1e-300)[:, None]
     covers = (models != np.arange(n)) & (np.abs(totals - totals[models]) <= COVERING_CELLS * totals)
     covers &= np.linalg.norm(middles - middles[models], axis=1) <= COVERING_CELLS * np.sqrt(totals)
     copies = np.flatnonzero(covers)
+    # replace the triangles of copies by those of their models
     origin_of = np.empty(n, dtype=np.int64)
     origin_of[cells] = origins
     rows, members = members_of(*grouped(cells, n), models[copies])
@@ -433,7 +454,8 @@ def _is_on(points: Floats, v: int, a: int, b: int, slack: float) -> bool:
 def _closest(points: Floats, a: int, b: int, c: int, d: int, middle: Floats) -> float:
     """Return the distance of edges ab and cd where they pass each other, and write the point in the middle, (3,).
 
-    The distance is infinite if the edges are parallel, or nearest to each other at an end.
+    The distance is infinite if the edges are parallel, or nearest to each other at an end. Edges ``a + s u`` and
+    ``c + t v`` pass each other at ``s = n · (w × v) / |n|²`` and ``t = n · (w × u) / |n|²``, with n = u × v, w = c − a.
     """
     u, v, w, n, square, s, t = np.empty(3), np.empty(3), np.empty(3), np.empty(3), 0.0, 0.0, 0.0
     for k in range(3):
@@ -472,7 +494,7 @@ def _normal(points: Floats, face: Ints) -> tuple[float, float, float]:
 @compiled
 def _is_over(points: Floats, x: Floats, face: Ints, n: Floats) -> bool:
     """Return whether the projection of x, (3,), on a face, (3,) point ids, along its normal n, (3,), is inside it."""
-    for k in range(3):
+    for k in range(3):  # x is on the left of each side: n · ((b − a) × (x − a)) > 0
         a, b = face[k], face[(k + 1) % 3]
         turn = 0.0
         for d in range(3):

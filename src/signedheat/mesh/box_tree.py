@@ -81,34 +81,35 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, starts: Ints, out: 
     """Write the ids of the boxes near each triangle into `out`, as far as there is room, and offsets into `starts`.
 
     A row of `corners` has the nine coordinates of a triangle; boxes are near if they are within its slack, of (t,)
-    `slacks`, along the axes, along its normal, and in its plane perpendicular to its sides.
+    `slacks`, along the axes, along its normal, and in its plane perpendicular to its sides: no such axis separates them
+    from the triangle. Descend to children only of boxes that are near.
     """
     bounds, items = tree
     leaves, stack = len(bounds) // 2, np.empty(64, dtype=np.int64)
-    # the box of the triangle; its normal and three directions in its plane, and its extent along these
-    lower, upper, ways, ends = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
+    # the box of the triangle; axes in its plane (0–2) and its normal (3), of any length; and its extents along these
+    lower, upper, axes, extents = np.empty(3), np.empty(3), np.empty((4, 3)), np.empty((4, 2))
     for t in range(len(corners)):
         for d in range(3):
             p, q = (d + 1) % 3, (d + 2) % 3
             a, b, c = corners[t, d], corners[t, 3 + d], corners[t, 6 + d]
             lower[d], upper[d] = min(a, b, c) - slacks[t], max(a, b, c) + slacks[t]
-            ways[3, d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
-            ways[3, d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
+            axes[3, d] = (corners[t, 3 + p] - corners[t, p]) * (corners[t, 6 + q] - corners[t, q])
+            axes[3, d] -= (corners[t, 3 + q] - corners[t, q]) * (corners[t, 6 + p] - corners[t, p])
         for k in range(3):  # perpendicular to each side, in the plane
             i, j = 3 * k, (3 * k + 3) % 9
             for d in range(3):
                 p, q = (d + 1) % 3, (d + 2) % 3
-                ways[k, d] = ways[3, p] * (corners[t, j + q] - corners[t, i + q])
-                ways[k, d] -= ways[3, q] * (corners[t, j + p] - corners[t, i + p])
+                axes[k, d] = axes[3, p] * (corners[t, j + q] - corners[t, i + q])
+                axes[k, d] -= axes[3, q] * (corners[t, j + p] - corners[t, i + p])
         for k in range(4):
-            give = 0.0
-            ends[k, 0], ends[k, 1] = np.inf, -np.inf
+            slack_along = 0.0
+            extents[k, 0], extents[k, 1] = np.inf, -np.inf
             for i in range(0, 9, 3):
-                along = ways[k, 0] * corners[t, i] + ways[k, 1] * corners[t, i + 1] + ways[k, 2] * corners[t, i + 2]
-                ends[k, 0], ends[k, 1] = min(ends[k, 0], along), max(ends[k, 1], along)
+                along = axes[k, 0] * corners[t, i] + axes[k, 1] * corners[t, i + 1] + axes[k, 2] * corners[t, i + 2]
+                extents[k, 0], extents[k, 1] = min(extents[k, 0], along), max(extents[k, 1], along)
             for d in range(3):
-                give += abs(ways[k, d]) * slacks[t]
-            ends[k, 0], ends[k, 1] = ends[k, 0] - give, ends[k, 1] + give
+                slack_along += abs(axes[k, d]) * slacks[t]
+            extents[k, 0], extents[k, 1] = extents[k, 0] - slack_along, extents[k, 1] + slack_along
         stack[0], depth, count = 1, 1, starts[t]
         while depth > 0:
             depth -= 1
@@ -122,9 +123,9 @@ def _meeting(tree: BoxTree, corners: Floats, slacks: Floats, starts: Ints, out: 
                 height, reach = 0.0, 0.0
                 for d in range(3):
                     low, high = bounds[node, d], bounds[node, 3 + d]
-                    height += ways[k, d] * 0.5 * (low + high)
-                    reach += abs(ways[k, d]) * 0.5 * (high - low)
-                apart |= height - reach > ends[k, 1] or height + reach < ends[k, 0]
+                    height += axes[k, d] * 0.5 * (low + high)
+                    reach += abs(axes[k, d]) * 0.5 * (high - low)
+                apart |= height - reach > extents[k, 1] or height + reach < extents[k, 0]
             if apart:
                 continue
             if node < leaves:

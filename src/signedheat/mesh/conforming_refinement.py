@@ -96,7 +96,8 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
 class FaceCutter:
     """An intrinsic mesh while some of its `faces`, ids, are cut along segments, and the ids `edges` divided at nodes.
 
-    The triangulation of a face begins at its corner ``begin[face]``.
+    The triangulation of a face begins at its corner ``begin[face]``. Making a cutter does all the work; `assemble`
+    makes a mesh of the results, which are numbered in lists and dictionaries until then.
     """
 
     def __init__(self, triangles: IntrinsicMesh, merged: MergedSources, faces: Ints, edges: Ints, begin: Ints) -> None:
@@ -105,9 +106,11 @@ class FaceCutter:
         self.faces: list[NewFace] = []
         self.pieces: list[NewSegment] = []
         self.cut_faces = faces.tolist()
+        # the vertex at each node of the sources, or −1, and the node at each vertex that has one
         nodes = merged.nodes
         self.vertex_of = np.where(nodes.kinds == VERTEX, nodes.elements, -1).tolist()
         self.node_at = {v: i for i, v in enumerate(self.vertex_of) if v >= 0}
+        # nodes on each edge that is divided, in order, and in each face that is cut; they become vertices
         self.on_edge: dict[int, list[int]] = {e: [] for e in edges.tolist()}
         self.in_face: dict[int, list[int]] = {f: [] for f in self.cut_faces}
         for i, (kind, element) in enumerate(zip(nodes.kinds.tolist(), nodes.elements.tolist(), strict=True)):
@@ -120,7 +123,7 @@ class FaceCutter:
             members.sort(key=lambda i: nodes.along[i])
         self.sub_edges = {e: [self.new_edge() for _ in range(len(m) + 1)] for e, m in self.on_edge.items()}
 
-        self.chains: dict[int, tuple[list[int], list[float], dict[int, int]]] = {}
+        self.chains: dict[int, tuple[list[int], list[float], dict[int, int]]] = {}  # results of `along_edge`
         inside = defaultdict(list)
         rows = zip(merged.ends.tolist(), merged.faces.tolist(), merged.edges.tolist(), strict=True)
         for p, ((tail, head), face, edge) in enumerate(rows):
@@ -268,6 +271,7 @@ class FaceCutter:
         face_edges = with_new(triangles.edges.face_edges, "edges")
         forward = with_new(triangles.edges.forward, "ahead")
         corners = with_new(triangles.corner_vertices, "corners")
+        # the mesh, with edges numbered without gaps
         used, first, flat = np.unique(face_edges, return_index=True, return_inverse=True)
         vertices = np.stack([corners.ravel()[first], np.roll(corners, -1, axis=1).ravel()[first]], axis=1)
         table = EdgeTable(vertices, flat.reshape(-1, 3), forward)
@@ -279,6 +283,7 @@ class FaceCutter:
         new_edge = np.full(self.n_edges, -1)
         new_edge[used] = np.arange(len(used))
 
+        # the nodes and segments of the sources, on elements of this mesh
         at_vertex = np.array(self.vertex_of)
         fill = np.zeros(len(at_vertex) - len(merged.nodes))
         kinds = np.where(at_vertex >= 0, VERTEX, np.concatenate([merged.nodes.kinds, fill]).astype(np.int64))

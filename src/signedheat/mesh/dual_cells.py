@@ -114,6 +114,7 @@ def dual_cells(
     """
     positions, edges, rows, sides = around
     ways = np.zeros((len(positions), 6), dtype=np.bool_)  # to link crossed edges at each face: see `_pieces_of_cell`
+    # ambiguous faces, with four crossed edges: the way is decided by whether the middle of the face is inside
     cells, faces = np.nonzero(_crossed_faces(edges) == 4)
     across, side = faces // 2, faces % 2
     first = positions[cells]

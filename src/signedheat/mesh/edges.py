@@ -192,7 +192,8 @@ def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[
     """Find the edges of halfedges, given by (h,) tails and heads; those for which `used` is false have none.
 
     Returns (h,) the edge of each halfedge, or −1, and (h,) whether it has the direction of the first halfedge of its
-    edge; then for each of e edges its number of halfedges, its first halfedge, and its second halfedge or −1.
+    edge; then for each of e edges its number of halfedges, its first halfedge, and its second halfedge or −1. Each edge
+    is in a linked list of edges at one of its ends, of which `last` is the head for each vertex.
     """
     degrees, last = np.zeros(n_vertices, dtype=np.int64), np.full(n_vertices, -1)
     for h in range(len(tails)):
@@ -205,7 +206,7 @@ def find_edges(tails: Ints, heads: Ints, used: Bools, n_vertices: int) -> tuple[
     for h in range(len(tails)):
         if not used[h]:
             continue
-        keeper, far_end = tails[h], heads[h]  # edges are listed at the end of lower degree
+        keeper, far_end = tails[h], heads[h]  # edges are listed at the end of lower degree, so that lists are short
         if degrees[far_end] < degrees[keeper] or (degrees[far_end] == degrees[keeper] and far_end < keeper):
             keeper, far_end = far_end, keeper
         edge = last[keeper]

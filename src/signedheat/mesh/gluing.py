@@ -45,7 +45,7 @@ class Gluing(NamedTuple):
     counts: Ints  # (5,) numbers of faces and other elements, in the order of `N_FACES` and the following
     steps: Ints  # (s, 4) the history: kind of each step, two halfedges or faces, and the new vertex
     weights: Floats  # (s, 4) coefficients of the affine dependency of the points of each step
-    scratch: Ints  # work array
+    scratch: Ints  # (4, 4) work array of `move`
     unit: float  # unit of length
 
 
@@ -85,6 +85,7 @@ def tangent_at(g: Gluing, h: int) -> tuple[float, float]:
 @compiled
 def move(g: Gluing, old: tuple[int, ...], new: tuple[int, ...]) -> None:
     """Renumber halfedges old[k] to new[k], all at once, with edges and siblings; tails are not moved."""
+    # read what is moved, since old and new numbers overlap; −1 for siblings before that are moved themselves
     successors, predecessors, edges, flags = g.scratch[0], g.scratch[1], g.scratch[2], g.scratch[3]
     for k in range(len(old)):
         after = g.sibling[old[k]]
@@ -161,6 +162,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     ib, bj = g.length[g.edge[preceding(t)]], g.length[g.edge[following(t)]]
     if not mirrored:
         ib, bj = bj, ib
+    # tan²(α/2) = n / d of both angles at i, and m / e of those at j
     n1, d1 = tangent_at(g, h)
     n2, d2 = tangent_at(g, at_i)
     m1, e1 = tangent_at(g, following(h))
@@ -168,6 +170,7 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     norm, norm_j = (n1 + d1) * (n2 + d2), (m1 + e1) * (m2 + e2)
     if not (norm > 0.0 and norm_j > 0.0):
         return 0.0, 0.0, 0.0, 0.0, 0.0
+    # sine and cosine of half the whole angle at i and at j, times √norm; then |ab| by the law of cosines
     sine, cosine = np.sqrt(n1 * d2) + np.sqrt(n2 * d1), np.sqrt(d1 * d2) - np.sqrt(n1 * n2)
     sine_j, cosine_j = np.sqrt(m1 * e2) + np.sqrt(m2 * e1), np.sqrt(e1 * e2) - np.sqrt(m1 * m2)
     length = np.sqrt((ai - ib) ** 2 + 4.0 * ai * ib * sine * sine / norm)
@@ -216,9 +219,10 @@ def flip_until_delaunay(g: Gluing, stack: Ints, stacked: Bools) -> bool:
         t = g.sibling[h]
         if g.fixed[e] or g.flips[e] >= MOST_FLIPS or t == h or g.sibling[t] != h or t // 3 == h // 3:
             continue
+        # Delaunay: the opposite angles sum to π at most, so that the product of their tan²(α/2) is at most 1
         n, d = tangent_at(g, preceding(h))
         m, c = tangent_at(g, preceding(t))
-        if not n * m > d * c * (1.0 + 1e-10) or not flip(g, h):  # Delaunay: the opposite angles sum to π at most
+        if not n * m > d * c * (1.0 + 1e-10) or not flip(g, h):
             continue
         g.flips[e] += 1
         t = g.sibling[h]
@@ -295,6 +299,7 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
     Each face (tail, head, apex) at the edge becomes (tail, x, apex), and (x, head, apex) is new. No face may have the
     edge twice.
     """
+    # all halfedges of the edge, and later those of its second half
     count = sibling_count(g, h)
     around, seconds = np.empty(count, np.int64), np.empty(count, np.int64)
     y = h
@@ -307,7 +312,7 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
     along = fraction if g.forward[h] else 1.0 - fraction
     whole = g.length[e]
     far_edge = new_edge(g, (1.0 - along) * whole, g.fixed[e])
-    for k in range(count):
+    for k in range(count):  # cut each face from x to its apex
         y, n = around[k], g.counts[N_FACES]
         g.counts[N_FACES] = n + 1
         share = along if g.forward[y] else 1.0 - along
@@ -320,6 +325,7 @@ def split_edge(g: Gluing, h: int, fraction: float) -> int:
         g.forward[second], g.front[second] = g.forward[y], g.front[y]
         pair(g, first, x, second + 2, opposite, cut)
         seconds[k] = second
+    # the half at the tail of the edge keeps its id
     g.length[e] = along * whole
     for k in range(count):
         l = (k + 1) % count

@@ -88,9 +88,10 @@ def _write_boxes(
     Boxes of leaves are as `_write_axes` turns them, and those of other nodes as that of their wider child.
     """
     leaves, points = len(largest) // 2, np.empty((max(16, 3 * TRIANGLES_PER_LEAF), 3))
-    for node in range(2 * leaves - 1, 0, -1):
+    for node in range(2 * leaves - 1, 0, -1):  # children before their parents
         count, wider, widest, first = 0, 0, -1.0, TRIANGLES_PER_LEAF * (node - leaves)
-        if first >= 0:
+        # the points that the box must contain: corners of triangles, or of the boxes of both children
+        if first >= 0:  # a leaf
             end = min(first + TRIANGLES_PER_LEAF, len(corners))
             _write_axes(corners, first, end, oriented, node)
             for f in range(first, end):
@@ -111,15 +112,17 @@ def _write_boxes(
                     for d in range(3):
                         points[count, d] = oriented[child, d]
                         for e in range(3):
-                            way = oriented[child, 3 + e] * oriented[child, 6 + 3 * e + d]
-                            points[count, d] += way if (k >> e) & 1 else -way
+                            half_side = oriented[child, 3 + e] * oriented[child, 6 + 3 * e + d]
+                            points[count, d] += half_side if (k >> e) & 1 else -half_side
                     count += 1
         if count == 0:
             continue
+        # the largest numbers of its triangles, or of its children
         for k in range(10):
             for i in range(TRIANGLES_PER_LEAF if first >= 0 else 2):
                 value = own[first + i, k] if first >= 0 else largest[2 * node + i, k]
                 largest[node, k] = max(largest[node, k], value)
+        # the extent of the points along each direction gives half widths and centre
         for k in range(3):
             square, least, most = 0.0, 0.0, 0.0
             for d in range(6 + 3 * k, 9 + 3 * k):
@@ -155,6 +158,7 @@ def oriented_apart(oriented: Floats, a: int, b: int, slack: float) -> bool:
     """Return whether the oriented boxes of nodes a and b are farther apart than a slack along a side of one of them.
 
     A row of `oriented` has the centre of a box, its half widths along its sides, and the three unit vectors of these.
+    Boxes that only axes across two sides separate count as near.
     """
     x, y, z = oriented[b, 0] - oriented[a, 0], oriented[b, 1] - oriented[a, 1], oriented[b, 2] - oriented[a, 2]
     for d in range(3, 6):

@@ -89,6 +89,7 @@ def _partners(starts: Ints, forward: Bools, labels: Ints) -> Ints:
     """
     partners = np.full(len(forward), -1)
     for edge in range(len(starts) - 1):
+        # pair those that are alone of their kind with a label
         first, count = starts[edge], starts[edge + 1] - starts[edge]
         rest, level = np.ones(count, dtype=np.bool_), 0
         for k in range(count):
@@ -106,6 +107,7 @@ def _partners(starts: Ints, forward: Bools, labels: Ints) -> Ints:
         if level != 0:
             partners[first : first + count] = -1
             continue
+        # begin where the level of the rest is least, so that nobody leaves before somebody has entered
         least, begin = 0, 0
         for k in range(count):
             if rest[k]:

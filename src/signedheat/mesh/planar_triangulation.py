@@ -24,7 +24,11 @@ also ends after so many crossings with other segments, in addition to their numb
 
 
 class Planar(NamedTuple):
-    """A triangulation in the plane, with n points and t triangles; edge k of a triangle begins at its vertex k."""
+    """A triangulation in the plane, with n points and t triangles; edge k of a triangle begins at its vertex k.
+
+    In the kernels, s is the triangle across edge k of triangle t, and j the same edge as one of s. That edge runs from
+    a to b in t, where c is the third vertex, and d is that of s; u, v, w and z are other vertices.
+    """
 
     x: Floats  # (n, 2) positions of points
     tri: Ints  # (t, 3) vertices of triangles, counter-clockwise
@@ -103,6 +107,7 @@ def triangulate_crossing(
     ways.clear()
     for s in range(len(segments)):
         begin, b = segments[s]
+        # `done` is how far the segment has come, see `_share`, and `last` how far at the last crossing
         a, done, last, most = begin, np.zeros(1), -1.0, mesh.room[0] + s + ROUNDS
         ways.append(a)
         for _ in range(ROUNDS + mesh.room[1]):
@@ -116,6 +121,7 @@ def triangulate_crossing(
             if mesh.room[0] > points and done[0] > last:  # else the point that was added before was not met
                 last = done[0]
                 continue
+            # rounding prevents flips: continue through a neighbour beside the segment
             goal = _beside(mesh, begin, done, a, b)
             if goal < 0:
                 break
@@ -171,6 +177,7 @@ def triangulate_polygon(points: Floats, n: int) -> Ints | None:
     triangles, across = _triangulate_apart(np.concatenate([around, points[order]]), np.array([1, 2, 3]), sides)
     if not len(triangles):
         return None
+    # regions between the sides; the inside is to the left of all sides
     rows, beyond = np.nonzero(across >= 0)
     regions = connected_components(len(triangles), rows, across[rows, beyond])
     tails = np.append([-1, -2, -3], order)[triangles]
@@ -334,6 +341,7 @@ def _flip(mesh: Planar, t: int, k: int) -> int:
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
     j = _place(tri, s, b)
     d = tri[s, (j + 2) % 3]
+    # triangles across the other four edges, and whether these are fixed
     bc, ca, ad, db = adj[t, (k + 1) % 3], adj[t, (k + 2) % 3], adj[s, (j + 1) % 3], adj[s, (j + 2) % 3]
     fbc, fca, fad, fdb = fixed[t, (k + 1) % 3], fixed[t, (k + 2) % 3], fixed[s, (j + 1) % 3], fixed[s, (j + 2) % 3]
     tri[t, 0], tri[t, 1], tri[t, 2] = c, a, d
@@ -357,7 +365,7 @@ def _insert(mesh: Planar, i: int) -> None:
     s = adj[t, k]
     if s >= 0 and depth <= mesh.near * _length(x, a, b):  # on an edge: four triangles
         _split_both(mesh, t, k, i)
-    else:
+    else:  # inside: three triangles, (a, b, i), (b, c, i) and (c, a, i)
         bc, ca = adj[t, (k + 1) % 3], adj[t, (k + 2) % 3]
         first = mesh.room[1]
         second = first + 1
@@ -409,7 +417,10 @@ def _improve(mesh: Planar) -> None:
 
 @compiled
 def _bad(mesh: Planar, t: int, k: int) -> bool:
-    """Return whether edge k of triangle t is not Delaunay and can be flipped."""
+    """Return whether edge k of triangle t is not Delaunay and can be flipped.
+
+    It is not Delaunay if the opposite angles, at c and d, sum to more than π, so that the sine of the sum is negative.
+    """
     x, tri, adj, flat = mesh.x, mesh.tri, mesh.adj, mesh.flat
     s = adj[t, k]
     a, b, c = tri[t, k], tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
@@ -440,13 +451,14 @@ def _locate(mesh: Planar, i: int) -> tuple[int, int, float]:
     """
     x, tri, adj, count = mesh.x, mesh.tri, mesh.adj, mesh.room[1]
     t = count - 1
-    for _ in range(count):
+    for _ in range(count):  # walk across the edge that the point is farthest beyond
         k, depth = _side(x, tri, t, i)
         if depth >= 0.0 or adj[t, k] < 0:
             break
         t = adj[t, k]
     if depth >= 0.0:
         return t, k, depth
+    # rounding puts the point outside: take the triangle that it is least outside of
     best, most = 0, -np.inf
     for t in range(count):
         k, depth = _side(x, tri, t, i)
@@ -473,7 +485,7 @@ def _edge(mesh: Planar, u: int, v: int) -> int:
     tri, adj, at = mesh.tri, mesh.adj, mesh.at
     first = at[u]
     t, back = first, False
-    while t >= 0:
+    while t >= 0:  # counter-clockwise around u, and from a side of the polygon on clockwise from the first triangle
         k = _place(tri, t, u)
         if tri[t, (k + 1) % 3] == v:
             return 3 * t + k
@@ -528,7 +540,7 @@ def _aim(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> tuple[int, i
     first = at[a]
     t, back = first, False
     crossed, edge, most, met = -1, -1, -np.inf, -1
-    while t >= 0:
+    while t >= 0:  # around a, as in `_edge`
         k = _place(tri, t, a)
         u, w = tri[t, (k + 1) % 3], tri[t, (k + 2) % 3]
         if u == b or w == b:
@@ -536,7 +548,7 @@ def _aim(mesh: Planar, begin: int, done: Floats, a: int, b: int) -> tuple[int, i
         for i in (u, w):
             if (met < 0 or _share(x, begin, b, i) < _share(x, begin, b, met)) and _meets(mesh, begin, done, b, i):
                 met = i
-        inside = min(-_turn(x, a, b, u), _turn(x, a, b, w))
+        inside = min(-_turn(x, a, b, u), _turn(x, a, b, w))  # positive if the segment runs between u and w
         if inside > most:
             crossed, edge, most = t, (k + 1) % 3, inside
         t = adj[t, k if back else (k + 2) % 3]
@@ -610,6 +622,7 @@ def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: in
         t, k = s, ((j + 1) % 3 if turn > 0.0 else (j + 2) % 3)  # (u, z) or (z, head)
         tails.append(tri[t, k])
         heads.append(tri[t, (k + 1) % 3])
+    # flip them in turn; those that cannot be flipped yet, and new ones that cross the segment, queue up again
     begin, left = 0, FLIP_TRIES * (len(tails) + 4)
     while begin < len(tails):
         left -= 1

@@ -107,6 +107,7 @@ def without_seams(segments: Floats) -> Floats:
         return segments
     _, first, ends = np.unique(np.rint(segments / near).reshape(-1, 2), axis=0, return_index=True, return_inverse=True)
     ends = ends.reshape(-1, 2)
+    # the corners that lie on each segment, in order along it
     corners, (tails, heads) = segments.reshape(-1, 2)[first], ends[ends[:, 0] != ends[:, 1]].T
     start, step = corners[tails], corners[heads] - corners[tails]
     lengths, in_space = np.linalg.norm(step, axis=1), np.pad(corners, ((0, 0), (0, 1)))
@@ -118,6 +119,7 @@ def without_seams(segments: Floats) -> Floats:
     order = np.flatnonzero(on)[np.lexsort((share[on], owners[on]))]
     goes_on = np.diff(owners[order]) == 0
     parts = np.stack([touched[order][:-1], touched[order][1:]], axis=1)[goes_on]
+    # parts that run there and back cancel
     pairs, pair = np.unique(np.sort(parts, axis=1), axis=0, return_inverse=True)
     net = np.bincount(pair.ravel(), np.where(parts[:, 0] < parts[:, 1], 1, -1), len(pairs))
     kept = np.where(net[:, None] < 0, pairs[:, ::-1], pairs)[net != 0]
@@ -130,6 +132,7 @@ def _united(outlines: list[Floats]) -> Any:
     It is a `CrossSection` of manifold3d. Outlines inside another are flipped together with it.
     """
     nonzero = manifold3d.FillRule.NonZero
+    # the outermost outline around each, if some run clockwise and some do not
     parts = [manifold3d.CrossSection([outline], nonzero) for outline in outlines]
     boxes = np.array([[outline.min(axis=0), outline.max(axis=0)] for outline in outlines])
     runs_back = np.array([_doubled_area(outline) < 0 for outline in outlines])

@@ -138,7 +138,9 @@ def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:
 def _pairs_of(tree: OrientedBoxes, triangles: Triangles, around: bool, node: int, end: int, out: Ints) -> int:
     """Write to `out` the pairs of overlapping triangles below a node, and of these with others below nodes up to `end`.
 
-    Returns the number of pairs, which may be larger than the room in `out`.
+    Returns the number of pairs, which may be larger than the room in `out`. Pairs of nodes are descended together; one
+    is left out if its boxes are apart, if no triangle is asked for, or if all are around one hub and `around` is false.
+    Columns of `own` and `largest` are described in `OrientedBoxes`.
     """
     own, largest, oriented = tree
     corners, ids, slacks = triangles
@@ -157,7 +159,7 @@ def _pairs_of(tree: OrientedBoxes, triangles: Triangles, around: bool, node: int
             if not around and largest[a, 8] >= 0.0 and largest[a, 8] + largest[a, 9] == 0.0:  # all of one hub
                 if largest[b, 8] == largest[a, 8] and largest[b, 9] == largest[a, 9]:
                     continue
-            if a < leaves:
+            if a < leaves:  # both nodes are on the same level; of a node with itself, each pair of children once
                 for i in range(4):
                     if a != b or i != 2:
                         stack[depth, 0], stack[depth, 1] = 2 * a + i // 2, 2 * b + i % 2
@@ -227,28 +229,31 @@ def _is_folded(p: Floats, q: Floats, apex: int, beyond: int) -> bool:
 
     The edge is opposite to corner `apex` of p and corner `beyond` of q.
     """
+    # how far along the edge both apexes are
     start, end = 3 * ((apex + 1) % 3), 3 * ((apex + 2) % 3)
-    square, height, other = 0.0, 0.0, 0.0
+    square, share_p, share_q = 0.0, 0.0, 0.0
     for d in range(3):
         along = p[end + d] - p[start + d]
         square += along * along
-        height += along * (p[3 * apex + d] - p[start + d])
-        other += along * (q[3 * beyond + d] - p[start + d])
+        share_p += along * (p[3 * apex + d] - p[start + d])
+        share_q += along * (q[3 * beyond + d] - p[start + d])
+    # the angle between the vectors to them, across the edge
     first, second, product = 0.0, 0.0, 0.0
     for d in range(3):
         along = (p[end + d] - p[start + d]) / square
-        x = p[3 * apex + d] - p[start + d] - height * along
-        y = q[3 * beyond + d] - p[start + d] - other * along
+        x = p[3 * apex + d] - p[start + d] - share_p * along
+        y = q[3 * beyond + d] - p[start + d] - share_q * along
         first, second, product = first + x * x, second + y * y, product + x * y
     return product > (1.0 - COVERING_FOLD) * np.sqrt(first * second)
 
 
 @compiled
-def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> bool:
+def overlap(p: Floats, q: Floats, slack: float, depth: float, axes: Floats) -> bool:
     """Return whether triangles p and q, (9,) each, overlap, by the separating axis test.
 
     They do if their projections overlap by more than `depth` along all axes across sides. Along their normals the
-    projections may be apart by `slack`. `ways`, (10, 3), is a work array.
+    projections may be apart by `slack`. `axes`, (10, 3), is a work array: rows 0–2 and 3–5 are the sides of p and of q,
+    6 and 7 their normals, and 8 and 9 these of unit length, or 0.
     """
     ox, oy, oz = p[0], p[1], p[2]  # rounding of products belongs to these triangles, not to where they are
     for d in range(3):
@@ -260,45 +265,46 @@ def overlap(p: Floats, q: Floats, slack: float, depth: float, ways: Floats) -> b
         corners = p if t == 0 else q
         for c in range(3):
             for d in range(3):
-                ways[3 * t + c, d] = corners[(3 * c + 3) % 9 + d] - corners[3 * c + d]
+                axes[3 * t + c, d] = corners[(3 * c + 3) % 9 + d] - corners[3 * c + d]
         for d in range(3):
             e, f = (d + 1) % 3, (d + 2) % 3
-            ways[6 + t, d] = ways[3 * t + 2, e] * ways[3 * t, f] - ways[3 * t + 2, f] * ways[3 * t, e]
-            ways[8 + t, d] = 0.0
-    for a in range(17):
-        # normals; sides turned in their planes, which separate most triangles that touch; cross products of sides
-        if a < 2:
-            i, j = 3 * a, 3 * a + 2
-        elif a < 8:
-            i, j = a - 2, 6 + (a - 2) // 3
+            axes[6 + t, d] = axes[3 * t + 2, e] * axes[3 * t, f] - axes[3 * t + 2, f] * axes[3 * t, e]
+            axes[8 + t, d] = 0.0
+    for number in range(17):
+        # normals; sides turned in their planes, which separate most triangles that touch; cross products of sides: each
+        # axis (x, y, z) is the cross product of rows i and j
+        if number < 2:
+            i, j = 3 * number, 3 * number + 2
+        elif number < 8:
+            i, j = number - 2, 6 + (number - 2) // 3
         else:
-            i, j = (a - 8) // 3, 3 + (a - 8) % 3
-        ux, uy, uz, vx, vy, vz = ways[i, 0], ways[i, 1], ways[i, 2], ways[j, 0], ways[j, 1], ways[j, 2]
+            i, j = (number - 8) // 3, 3 + (number - 8) % 3
+        ux, uy, uz, vx, vy, vz = axes[i, 0], axes[i, 1], axes[i, 2], axes[j, 0], axes[j, 1], axes[j, 2]
         x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         length = np.sqrt(x * x + y * y + z * z)
         scale = np.sqrt((ux * ux + uy * uy + uz * uz) * (vx * vx + vy * vy + vz * vz))
         if not length > 1e-9 * scale:
             continue
         x, y, z = x / length, y / length, z / length
-        if a < 2:
-            ways[8 + a, 0], ways[8 + a, 1], ways[8 + a, 2] = x, y, z
-        elif a >= 8:  # along a normal both are flat and touch
+        if number < 2:
+            axes[8 + number, 0], axes[8 + number, 1], axes[8 + number, 2] = x, y, z
+        elif number >= 8:  # along a normal both are flat and touch
             upright = False
             for t in range(2):
-                cosine = ways[8 + t, 0] * x + ways[8 + t, 1] * y + ways[8 + t, 2] * z
+                cosine = axes[8 + t, 0] * x + axes[8 + t, 1] * y + axes[8 + t, 2] * z
                 upright |= abs(cosine) > 1.0 - 1e-13
             if upright:
                 continue
-        p0 = q0 = np.inf
-        p1 = q1 = -np.inf
+        p_low = q_low = np.inf
+        p_high = q_high = -np.inf
         for c in range(0, 9, 3):
-            s = (p[c] - ox) * x + (p[c + 1] - oy) * y + (p[c + 2] - oz) * z
-            p0, p1 = min(p0, s), max(p1, s)
-            s = (q[c] - ox) * x + (q[c + 1] - oy) * y + (q[c + 2] - oz) * z
-            q0, q1 = min(q0, s), max(q1, s)
-        if a < 2:
-            if p0 > q1 + slack or q0 > p1 + slack:
+            along = (p[c] - ox) * x + (p[c + 1] - oy) * y + (p[c + 2] - oz) * z
+            p_low, p_high = min(p_low, along), max(p_high, along)
+            along = (q[c] - ox) * x + (q[c + 1] - oy) * y + (q[c + 2] - oz) * z
+            q_low, q_high = min(q_low, along), max(q_high, along)
+        if number < 2:
+            if p_low > q_high + slack or q_low > p_high + slack:
                 return False
-        elif p0 >= q1 - depth or q0 >= p1 - depth:
+        elif p_low >= q_high - depth or q_low >= p_high - depth:
             return False
     return True

@@ -129,6 +129,7 @@ def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
     A group is a pair of nodes each of which has its strongest link to the other, with all further nodes whose strongest
     link is to one of the two.
     """
+    # the strongest link of each node; a node without links is linked with itself
     n, neighbors = weights.shape[0], weights.indices
     degrees = np.diff(weights.indptr)
     rows = np.repeat(np.arange(n), degrees)
@@ -139,6 +140,7 @@ def _contraction(weights: sparse.csr_matrix) -> tuple[Ints, Floats]:
     nodes = np.arange(n)
     best, weight = nodes.copy(), np.ones(n)
     best[linked], weight[linked] = neighbors[strongest], weights.data[strongest]
+    # groups are named by the lower node of their pair, their leader, whose sign is 1
     mutual = best[best] == nodes
     leader, sign = nodes.copy(), np.ones(n)
     later = mutual & (best < nodes)

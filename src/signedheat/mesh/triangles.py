@@ -158,6 +158,7 @@ def areas_of_polygons(vertices: Floats, corners: Ints, offsets: Ints) -> tuple[F
             for d in range(3):
                 middle[d] += vertices[v, d] / (offsets[f + 1] - offsets[f])
                 largest = max(largest, abs(vertices[v, d]))
+        # the area vector is half the sum of cross products over the sides
         for c in range(offsets[f], offsets[f + 1]):
             tail, head = corners[c], corners[c + 1 if c + 1 < offsets[f + 1] else offsets[f]]
             for d in range(3):
@@ -231,6 +232,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
         (a, d, (j + 1) % 3, second, 0),
         (d, b, (j + 2) % 3, second, 1),
     )
+    # how much less the surface bends across the edge itself, and across the four edges around it
     new = np.stack([a, d, c], axis=1), np.stack([d, b, c], axis=1)
     new_normals = [unit(area_vectors(vertices[corners])) for corners in new]
     gain = _bend(vertices, a, b, normals[first], normals[second]) - _bend(vertices, c, d, *new_normals)
@@ -243,6 +245,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
         before = _bend(vertices, tail, head, normals[owner], normals[neighbor])
         after = _bend(vertices, tail, head, new_normals[side_of_rim], normals[neighbor])
         gain += np.where(beyond >= 0, before - after, 0.0)
+    # which flips are allowed
     keys = edge_keys(c, d)
     present = np.isin(keys, edge_keys(*table.vertices.T))
     gain[~(whole[a] & whole[b] & (whole[c] | whole[d])) | (c == d)] = 0.0
@@ -250,6 +253,7 @@ def _flips(vertices: Floats, faces: Ints, whole: Bools, held: Bools | None) -> t
     gain[present] = 0.0
     if held is not None:
         gain[held[a] | held[b] | held[c] | held[d]] = 0.0
+    # a flip is chosen if it gains more than all others with one of its six faces
     rank = 1 + np.argsort(np.argsort(gain, kind="stable"))
     rank[gain <= 1e-9 * reach] = 0  # less is rounding
     best = np.zeros(len(faces), dtype=np.int64)

@@ -266,14 +266,15 @@ def mixed(a: int, b: int, c: int) -> int:
 def _weld(points: Floats, tolerances: Floats) -> Ints:
     """Return (n,) the point into which each of (n, 3) points is merged, as `welded` does, for (3,) tolerances.
 
-    It uses a hash table of cells 16 tolerances wide.
+    It uses a hash table of cells 16 tolerances wide, each a linked list of the points that are not merged: `newest` is
+    its last one, and `older` the one before each.
     """
     n = len(points)
     bits = 4
     while (1 << bits) < 2 * n:
         bits += 1
     mask = (1 << bits) - 1
-    heads, following = np.full(1 << bits, -1, dtype=np.int32), np.full(n, -1, dtype=np.int32)
+    newest, older = np.full(1 << bits, -1, dtype=np.int32), np.full(n, -1, dtype=np.int32)
     owner = np.empty(n, dtype=np.int64)
     (near_x, near_y, near_z), (side_x, side_y, side_z) = tolerances, 16.0 * tolerances  # few points are near cell walls
     for p in range(n):
@@ -285,19 +286,19 @@ def _weld(points: Floats, tolerances: Floats) -> Ints:
         for i in range(low_x, high_x + 1):
             for j in range(low_y, high_y + 1):
                 for k in range(low_z, high_z + 1):
-                    q = heads[mixed(i, j, k) & mask]
-                    while q >= 0:
-                        is_near = abs(points[q, 0] - x) <= near_x and abs(points[q, 1] - y) <= near_y
-                        if is_near and abs(points[q, 2] - z) <= near_z and (first < 0 or q < first):
-                            first = q
-                        q = following[q]
+                    other = newest[mixed(i, j, k) & mask]
+                    while other >= 0:
+                        is_near = abs(points[other, 0] - x) <= near_x and abs(points[other, 1] - y) <= near_y
+                        if is_near and abs(points[other, 2] - z) <= near_z and (first < 0 or other < first):
+                            first = other
+                        other = older[other]
         if first >= 0:
             owner[p] = first
             continue
         owner[p] = p
         home = mixed(own_x, own_y, own_z) & mask
-        following[p] = heads[home]
-        heads[home] = p
+        older[p] = newest[home]
+        newest[home] = p
     return owner
 
 
@@ -316,7 +317,7 @@ def _cells_near(x: float, near: float, side: float) -> tuple[int, int, int]:
 
 @compiled
 def _same_rows(rows: Ints) -> Ints:
-    """Return (n,) the first row that equals each of (n, k) rows, by a hash table of rows."""
+    """Return (n,) the first row that equals each of (n, k) rows, by a hash table of rows with linear probing."""
     count, width = rows.shape
     size = 16
     while size < 2 * count:
