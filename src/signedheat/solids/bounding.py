@@ -101,10 +101,11 @@ class _Parts:
         areas = np.bincount(of_triangles[~whole], chain.areas[~whole]).astype(np.float64)
         return cls(chain, whole, pieces, of_pieces, of_triangles, areas)
 
-    def missing(self, decided: Bounding) -> Floats:
-        """(p,) share of the area of each part that is unexplained."""
+    def judged(self, decided: Bounding) -> _Judged:
+        """Measure how much of each piece, and of each part, a decision leaves unexplained."""
         areas = np.bincount(self.pieces[~self.whole], self.chain.areas[~self.whole]).astype(np.float64)
-        return means(unexplained(self.chain, decided.counts, self.pieces), self.of_pieces, areas, len(self.areas))
+        of_pieces = unexplained(self.chain, decided.counts, self.pieces)
+        return _Judged(decided, of_pieces, means(of_pieces, self.of_pieces, areas, len(self.areas)))
 
     def changed(self, first: Bounding, second: Bounding) -> Floats:
         """(p,) share of the area of each part that counts differently in two decisions."""
@@ -117,6 +118,14 @@ class _Parts:
         firsts = [first_members(reading.pieces, len(reading.orientable))[reading.pieces] for reading in (first, second)]
         rows = np.flatnonzero(~self.whole & ((first.counts != second.counts) | (firsts[0] != firsts[1])))
         return mask_of(len(self.areas), self.of_triangles[rows])
+
+
+class _Judged(NamedTuple):
+    """A decision, and how much it leaves unexplained."""
+
+    decided: Bounding
+    of_pieces: Floats  # (q,) share of the area of each piece, as given, that is unexplained
+    missing: Floats  # (p,) the same of each part
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,36 +154,35 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     if as_oriented or whole.all():
         return decided
     parts = _Parts.of(chain, given)
-    missing = parts.missing(decided)
+    best = parts.judged(decided)
     readings, chosen, overlapping = [given], np.zeros(len(whole), dtype=np.int64), False
     if cone_volumes(chain.triangles, given.counts, parts.of_triangles + 1, len(parts.areas) + 1).sum() < 0:
         inside_out = _reversed(given)
-        candidate = _decided(chain, inside_out, held, nested)
-        left_unexplained = parts.missing(candidate)
-        if parts.areas @ left_unexplained < parts.areas @ missing - LEAST_GAIN * parts.areas.sum():
-            readings, decided, missing = [inside_out], candidate, left_unexplained
+        candidate = parts.judged(_decided(chain, inside_out, held, nested))
+        if parts.areas @ candidate.missing < parts.areas @ best.missing - LEAST_GAIN * parts.areas.sum():
+            readings, best = [inside_out], candidate
     by_once = once(chain)
-    for trial in _trials(chain, parts, given, by_once, missing, nested):
-        improvable = trial.parts & (missing >= trial.least)
+    for trial in _trials(chain, parts, given, by_once, best.missing, nested):
+        present, improvable = best, trial.parts & (best.missing >= trial.least)
         if not improvable.any() or (trial.overlaps and not overlapping):
             continue
         readings.append(trial.reading)
-        best = float(parts.areas @ missing), decided, chosen, missing
+        least, best_choice = float(parts.areas @ present.missing), chosen
         for _ in range(2):  # first for all of these parts, then for those only that it explains better
             assignment = np.where(~whole & improvable[parts.of_triangles], len(readings) - 1, chosen)
             reading, fixed = mixed(chain, readings, assignment), held & (assignment == 0)
-            candidate = _decided(chain, reading, fixed, trial.nested or nested, united=trial.united)
-            overlapping |= candidate.overlapping
-            left_unexplained, price = parts.missing(candidate), LEAST_GAIN * parts.changed(decided, candidate)
-            cost = float(parts.areas @ (left_unexplained + price))
-            if cost < best[0]:
-                best = cost, candidate, assignment, left_unexplained
-            better = improvable & (left_unexplained < missing - price)
+            candidate = parts.judged(_decided(chain, reading, fixed, trial.nested or nested, united=trial.united))
+            overlapping |= candidate.decided.overlapping
+            price = LEAST_GAIN * parts.changed(present.decided, candidate.decided)
+            cost = float(parts.areas @ (candidate.missing + price))
+            if cost < least:
+                least, best, best_choice = cost, candidate, assignment
+            better = improvable & (candidate.missing < present.missing - price)
             if (better == improvable).all() or not better.any():
                 break
             improvable = better
-        _, decided, chosen, missing = best
-    inside = unexplained(chain, decided.counts, parts.pieces) < MOSTLY_WRONG
+        chosen = best_choice
+    decided, inside = best.decided, best.of_pieces < MOSTLY_WRONG
     inner = decided.inner | (~whole & ~decided.as_given & (decided.counts == 0) & inside[parts.pieces])
     decided = replace(decided, inner=inner, turned=decided.turned & ~inner)
     return _with_sheets_agreeing(chain, decided, by_once, whole)

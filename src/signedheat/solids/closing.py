@@ -406,20 +406,26 @@ class _Surface(Frozen):
 
     @cached_property
     def _sides(self) -> tuple[Ints, Ints]:
-        """(3 m,) sorted keys of directed sides, and (3 m,) these sides, 3 f + c.
+        """(k,) sorted keys of directed sides of faces at the loops, and (k,) these sides, 3 f + c.
 
         Among sides with the same key, the first is of an open piece if possible, and of the largest face.
         """
-        keys = (self.faces * len(self.vertices) + np.roll(self.faces, -1, axis=1)).ravel()
-        pieces = connected_components(len(self.faces), *self.edges.pairs.T // 3)
-        closed = ~np.isin(pieces, open_edges(self.faces, pieces)[1])
-        order = np.lexsort((-np.repeat(self.areas, 3), np.repeat(closed, 3), keys))
-        return keys[order], order
+        on_rim = mask_of(len(self.vertices), np.concatenate(self.loops))
+        rows = np.flatnonzero(on_rim[self.faces].any(axis=1))
+        keys = (self.faces[rows] * len(self.vertices) + np.roll(self.faces[rows], -1, axis=1)).ravel()
+        sides = (3 * rows[:, None] + np.arange(3)).ravel()
+        if len(np.unique(keys)) == len(keys):
+            order = np.argsort(keys)
+        else:
+            pieces = connected_components(len(self.faces), *self.edges.pairs.T // 3)
+            closed = ~np.isin(pieces[rows], open_edges(self.faces, pieces)[1])
+            order = np.lexsort((-np.repeat(self.areas[rows], 3), np.repeat(closed, 3), keys))
+        return keys[order], sides[order]
 
     def behind(self, tails: Ints, heads: Ints) -> tuple[Ints, Ints]:
         """(n,) faces behind the edges of loops from (n,) tails to heads, and (n,) the third vertices of these faces."""
-        keys, order = self._sides
-        face, side = np.divmod(order[np.searchsorted(keys, heads * len(self.vertices) + tails)], 3)
+        keys, sides = self._sides
+        face, side = np.divmod(sides[np.searchsorted(keys, heads * len(self.vertices) + tails)], 3)
         return face, self.faces[face, (side + 2) % 3]
 
 

@@ -413,21 +413,22 @@ def _from_mesh(mesh: TriangleMesh, chain: Chain, decided: Bounding, options: Com
         if by_heat or scatter or decided.levels[chosen[0]] < TORN_LEVEL:
             torn[chosen] = True
             surfaces += _completed_by_heat(vertices, faces[chosen], chain.firsts[chosen], scatter, method)
+    lids = None
     bounds = np.repeat(np.arange(len(faces)), np.where(torn, 0, counts))  # a face that bounds twice is taken twice
     if len(bounds):
         closed, notes = _closed_by_lids(vertices, faces[bounds], chain.firsts[bounds], options.lids == "bent")
         surfaces.append(closed)
-    once = vertices[faces[(counts > 0) & ~torn]]
+        lids = None if torn.any() else closed.triangles[closed.origins < 0]
     sheets = np.flatnonzero(counts == 0)
     if len(sheets):
         surfaces.append(TriangleGroup(vertices[faces[sheets]], faces[sheets], chain.firsts[sheets], closing=False))
     solid = united(surfaces, options.keep_overlaps, notes)
-    _warn_of_guesses(solid, None if torn.any() else once)
+    _warn_of_guesses(solid, lids)
     return solid
 
 
-def _warn_of_guesses(solid: Solid, bounding: Floats | None) -> None:
-    """Warn if much of a solid is completed, or if its lids overrule winding numbers of (m, 3, 3) `bounding` faces.
+def _warn_of_guesses(solid: Solid, lids: Floats | None) -> None:
+    """Warn if much of a solid is completed, or if its (m, 3, 3) `lids` overrule the winding numbers of its faces.
 
     These are None if heat completed the solid, since winding numbers tell little about torn bodies.
     """
@@ -436,15 +437,19 @@ def _warn_of_guesses(solid: Solid, bounding: Floats | None) -> None:
             continue
         if note.completed_share > MOSTLY_GIVEN:
             warn_user(f"{note}: where so much is missing, the result is a guess", InexactWarning)
-        elif bounding is not None and overruled(solid, bounding) > MOST_OVERRULED:
+        elif lids is not None and overruled(solid, lids) > MOST_OVERRULED:
             warn_user(f'{note}, against the winding numbers of its faces: try lids="flat"', InexactWarning)
 
 
-def overruled(solid: Solid, triangles: Floats) -> float:
-    """Return the share of the box of a solid in which winding numbers of (m, 3, 3) faces clearly contradict it."""
+def overruled(solid: Solid, lids: Floats) -> float:
+    """Return the share of the box of a solid in which winding numbers of its faces clearly contradict it.
+
+    They are those of the solid less those of its (m, 3, 3) lids.
+    """
     lower, upper = solid.bounds
     points = lower + np.random.default_rng(0).random((EVIDENCE_POINTS, 3)) * (upper - lower)
-    windings, inside = WindingTree.of(triangles).numbers(points), solid.inside(points)
+    inside = solid.inside(points)
+    windings = solid.windings.numbers(points) - WindingTree.of(lids).numbers(points)
     return float(np.where(inside, windings < 1 - CLEAR_WINDING, windings > CLEAR_WINDING).mean())
 
 
