@@ -254,6 +254,7 @@ def _collect(
     count, before = list_length(following, queued[halfedge]), list_length(following, settled[halfedge])
     # each window is compared with all others: for four windows, this counts as the work of making one
     counts[WINDOWS_MADE] += count * (count + before) // 16
+    # what is left of each, sorted by where it begins
     chosen = np.empty((count, 6))
     count, row = 0, queued[halfedge]
     while row >= 0:
@@ -273,6 +274,7 @@ def _collect(
         free_row(counts, following, row)
         row = after
     queued[halfedge] = -1
+    # trim and merge successive ones; the first `kept` rows are done
     kept = 0
     for k in range(count):
         if kept > 0:
@@ -394,6 +396,7 @@ def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, toler
         w = front[k]
         if w[KIND] == FOCUS and w[Q] <= y:
             straighten(w)
+        # the rays at both ends of the window, and on which side of the apex they pass
         s0, s1, kind = w[S0], w[S1], w[KIND]
         d0x, d0y = ray(w, s0)
         d1x, d1y = ray(w, s1)
@@ -407,6 +410,7 @@ def _cross_face(faces: Faces, search: Search, halfedge: int, slack: float, toler
         else:
             to_apex = arrival(w, x, y)
         _reach(search, faces.vertices[face, before], to_apex)
+        # the wave in the layout of the face, and the parts of the other two sides between the rays, t0 to t1
         way = unit * (w[P] + up * w[Q])
         source, normal = (origin, way) if kind == BEAM else (origin + way, 0j)
         if left < 0.0:  # from the tail towards the apex
@@ -469,7 +473,8 @@ def outrun(w: Floats, at_tail: float, at_head: float, length: float, slack: floa
 def trim(a: Floats, b: Floats) -> None:
     """Trim two overlapping windows in place to the parts in which each has the smaller distance; a begins first.
 
-    No window is divided: if b is nearer in the middle of a, both stay.
+    No window is divided: if b is nearer in the middle of a, both stay. The nearer one at both ends of their common part
+    keeps it; if these differ, bisection finds where the distances are equal.
     """
     if b[S0] >= a[S1]:
         return
@@ -502,7 +507,8 @@ def trim(a: Floats, b: Floats) -> None:
 def trim_by(old: Floats, w: Floats, slack: float) -> None:
     """Shorten window w, in place, where it is not nearer by more than `slack` than an older window.
 
-    It is shortened at one end only, or removed, but no gap is cut into its middle.
+    It is shortened at one end only, or removed, but no gap is cut into its middle. `first` and `last` say whether w is
+    not nearer at the ends of the common part; if these differ, bisection finds where that changes.
     """
     low, high = max(old[S0], w[S0]), min(old[S1], w[S1])
     if not high > low:
@@ -553,7 +559,8 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
     if abs(a[S1] - b[S0]) > 1e-6 * length:
         return False
     s0, between, s1 = a[S0], a[S1], b[S1]
-    # the merged wave has the rays of a at its beginning and of b at its end: its centre is where these meet
+    # the merged wave has the rays of a at its beginning and of b at its end: its centre is where these meet, or it is a
+    # beam where they are nearly parallel
     ax, ay = ray(a, s0)
     bx, by = ray(b, s1)
     a_norm, b_norm = np.sqrt(ax * ax + ay * ay), np.sqrt(bx * bx + by * by)
@@ -577,6 +584,7 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
         merged[P], merged[Q] = s0 + to_centre * ax, to_centre * ay
         merged[KIND] = POINT if to_centre < 0.0 else FOCUS
         merged[SIGMA] = begin + to_centre
+    # errors are 0 at the beginning; half of the largest is taken off all distances
     error, end_error = arrival(merged, between, 0.0) - middle, arrival(merged, s1, 0.0) - end
     if max(abs(error), abs(end_error)) > tolerance * length:
         return False
@@ -738,6 +746,7 @@ def propagate_across(
         search.following,
         search.counts,
     )
+    # the window in the frame of the edge, in the work row
     w = windows[0]
     w[S0], w[S1], w[KIND] = t0 * length, t1 * length, kind
     unit = (b - a) / length
@@ -754,6 +763,7 @@ def propagate_across(
     near = min(arrival(w, w[S0], 0.0), arrival(w, w[S1], 0.0))
     if not near < np.inf:
         return
+    # it waits at all other halfedges of the edge, long enough for others to arrive there with which it can be merged
     for k in range(begin, end):
         halfedge = faces.halfedges[k]
         if halfedge != 3 * face + side:
@@ -805,6 +815,7 @@ def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
     These are beams to the left of segments, as wide as the segment, and circular waves from points, in the directions
     that are more than 90° from both directions of the fan.
     """
+    # beams: how far along the segment, and to its left, each side begins, and how fast that changes along the side
     faces, starts = sources.beam_faces, sources.beam_starts[:, None]
     lengths = np.abs(sources.beam_stops[:, None] - starts)
     along = (sources.beam_stops[:, None] - starts) / lengths
@@ -813,6 +824,7 @@ def first_waves(triangles: IntrinsicMesh, sources: GeodesicSources) -> Waves:
     apart = np.abs(height) + np.abs(climb) > 1e-9 * np.abs(steps)  # no beam from a segment on this side crosses it
     beams = parts_within(apart, (-foot, -rate), (foot - lengths, rate), (-height, -climb))
 
+    # fans: how far each side begins along both directions, and how fast that changes along the side
     points = sources.fan_points[:, None]
     tails, steps = triangles.corner_positions[sources.fan_faces] - points, triangles.edge_vectors[sources.fan_faces]
     apart = dot(-tails, 1j * steps) > 1e-9 * np.abs(steps) ** 2

@@ -81,6 +81,7 @@ class PlacedSegments:
             [(barycentric_in(triangles, faces, nodes[ends[:, k]]) * corners).sum(axis=1) for k in range(2)], axis=1
         )
         steps = positions[:, 1] - positions[:, 0]
+        # nodes that are in a face twice, as in faces glued to themselves: the length of the segment decides
         for i in np.flatnonzero(np.abs(np.abs(steps) - np.abs(vectors)) > 1e-6 * np.abs(corners).max(axis=1)).tolist():
             positions[i] = best_match(triangles, faces[i], nodes, ends[i], abs(vectors[i]))
             steps[i] = positions[i, 1] - positions[i, 0]
@@ -103,6 +104,7 @@ class PlacedSegments:
             i = np.flatnonzero(loops & vertex[:, k] & ~vertex[:, 1 - k])
             shares = np.abs(vectors[i]) / triangles.lengths_of_edges[edges[i]]
             along[i, k] = np.where(np.abs(along[i, 1 - k] - shares) < np.abs(1 - along[i, 1 - k] - shares), 0.0, 1.0)
+        # one copy of the segment for each face at the edge
         owners, halfedges = halfedges_of(triangles, edges)
         faces, local_sides = halfedges // 3, halfedges % 3
         forward = triangles.edges.forward[faces, local_sides]
@@ -180,6 +182,7 @@ class PlacedSegments:
         gap = np.abs(on_each_side.reshape(-1, 3) - self.positions.T.ravel()[at_edge][:, None])
         k = np.where(triangles.edges.face_edges[faces] == edges[:, None], gap, np.inf).argmin(axis=1)
         away[at_edge] = triangles.in_edge_frames(away[at_edge], faces, k)
+        # across edges of three or more faces there is no direction: the fan is whole
         branching = (triangles.edges.face_counts[edges] > 2) & ~self.along_edge[seg[at_edge]]
         away[at_edge[branching]] = 0
         away, node = away[away != 0], node[away != 0]
@@ -201,6 +204,7 @@ def zero_line(triangles: IntrinsicMesh, values: Floats, among: Bools | None = No
         corner_values > 0, ~np.isnan(corner_values).any(axis=1) & (True if among is None else among)
     )
     edges = triangles.edges.face_edges[faces[:, None], sides]
+    # a node on each crossed edge
     used, first, ends = np.unique(edges, return_index=True, return_inverse=True)
     tail, head = values[triangles.edges.vertices[used]].T
     along = tail / (tail - head)

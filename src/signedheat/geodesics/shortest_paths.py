@@ -168,49 +168,52 @@ def _find_sleeve(faces: Faces, routes: Routes, starts: Places, ends: Places, pai
     other point; `routes` are found by Dijkstra's algorithm. Returns (k,) halfedges by which it leaves faces, and (k,)
     halfedges by which it enters the next; empty if there is no path.
     """
+    # from the first point to the sides of its faces
     cost, leave, enter, queue, middles, tolls = routes
     edge_of, touched = faces.edges.ravel(), [0]
     touched.pop()
-    for s in range(starts.first[pair], starts.first[pair + 1]):
+    for place in range(starts.first[pair], starts.first[pair + 1]):
         for k in range(3):
-            h, e = 3 * starts.faces[s] + k, edge_of[3 * starts.faces[s] + k]
-            d = abs(middles[h] - starts.points[s]) * tolls[e]
-            if d < cost[e]:
-                cost[e], leave[e], enter[e] = d, h, -1
-                touched.append(e)
-                push(queue, e, d)
+            halfedge, edge = 3 * starts.faces[place] + k, edge_of[3 * starts.faces[place] + k]
+            length = abs(middles[halfedge] - starts.points[place]) * tolls[edge]
+            if length < cost[edge]:
+                cost[edge], leave[edge], enter[edge] = length, halfedge, -1
+                touched.append(edge)
+                push(queue, edge, length)
+    # from edge to edge; `best` is the shortest path to the second point so far, and `last` where it enters its face
     best, last = np.inf, np.int64(-1)
     while queue.size[0] > 0:
-        e = pop(queue)
-        d = cost[e]
-        if d >= best:
+        edge = pop(queue)
+        length = cost[edge]
+        if length >= best:
             break
-        for k in range(faces.first_halfedge[e], faces.first_halfedge[e + 1]):
-            h = faces.halfedges[k]
-            if h == leave[e]:
+        for k in range(faces.first_halfedge[edge], faces.first_halfedge[edge + 1]):
+            halfedge = faces.halfedges[k]
+            if halfedge == leave[edge]:
                 continue
-            entry = middles[h]
-            for s in range(ends.first[pair], ends.first[pair + 1]):
-                if ends.faces[s] == h // 3 and d + abs(entry - ends.points[s]) < best:
-                    best, last = d + abs(entry - ends.points[s]), h
-            for out in (following(h), preceding(h)):
-                to = edge_of[out]
-                longer = d + abs(middles[out] - entry) * tolls[to]
-                if longer < cost[to]:
-                    cost[to], leave[to], enter[to] = longer, out, h
-                    touched.append(to)
-                    push(queue, to, longer)
-    n, h = 0, last
-    while h >= 0:
-        n, h = n + 1, enter[edge_of[h]]
-    left, entered = np.empty(n, np.int64), np.empty(n, np.int64)
-    while n > 0:
-        n -= 1
-        e = edge_of[last]
-        entered[n], left[n] = last, leave[e]
-        last = enter[e]
-    for e in touched:
-        cost[e], queue.places[e] = np.inf, -1
+            entry = middles[halfedge]
+            for place in range(ends.first[pair], ends.first[pair + 1]):
+                if ends.faces[place] == halfedge // 3 and length + abs(entry - ends.points[place]) < best:
+                    best, last = length + abs(entry - ends.points[place]), halfedge
+            for way_out in (following(halfedge), preceding(halfedge)):
+                next_edge = edge_of[way_out]
+                through_here = length + abs(middles[way_out] - entry) * tolls[next_edge]
+                if through_here < cost[next_edge]:
+                    cost[next_edge], leave[next_edge], enter[next_edge] = through_here, way_out, halfedge
+                    touched.append(next_edge)
+                    push(queue, next_edge, through_here)
+    # back along this path
+    count, halfedge = 0, last
+    while halfedge >= 0:
+        count, halfedge = count + 1, enter[edge_of[halfedge]]
+    left, entered = np.empty(count, np.int64), np.empty(count, np.int64)
+    while count > 0:
+        count -= 1
+        edge = edge_of[last]
+        entered[count], left[count] = last, leave[edge]
+        last = enter[edge]
+    for edge in touched:
+        cost[edge], queue.places[edge] = np.inf, -1
     queue.size[0] = 0
     return left, entered
 
@@ -266,12 +269,13 @@ def funnel(portals: Complexes, over: Ints, start: complex, end: complex) -> tupl
         for side in range(2):
             opposite, sign = 1 - side, 1.0 - 2.0 * side
             point = portals[i, side ^ over[i]] if i < len(portals) else end
-            if sign * cross(rims[side] - apex, point - apex) < 0:
+            if sign * cross(rims[side] - apex, point - apex) < 0:  # outside the funnel on this side
                 continue
             if apex == rims[side] or sign * cross(rims[opposite] - apex, point - apex) < 0:
                 if i < len(portals):
                     rims[side], rim_portals[side] = point, i
                 continue
+            # beyond the opposite rim: bend there, and begin anew from its portal on
             i = rim_portals[opposite]
             bends.append(i)
             ends.append(opposite ^ over[i])
@@ -363,7 +367,7 @@ def _straighten(
     """
     portals, begin, end, bends, bend_ends, length = _path_in(faces, left, entered, starts, ends, pair)
     k = 0
-    while k < len(bends):
+    while k < len(bends):  # from the first bend on again whenever one has helped
         point = portals[bends[k], bend_ends[k]]
         try_left, try_entered = other_way(faces, left, entered, portals, bends[k], point)
         k += 1
@@ -373,6 +377,7 @@ def _straighten(
         if path[5] < length * (1 - 1e-12):
             left, entered, k = try_left, try_entered, 0
             portals, begin, end, bends, bend_ends, length = path
+    # where the straight lines between bends cross the portals
     fractions = np.empty(len(left))
     last_bend, k = begin, 0
     for i in range(len(left)):

@@ -79,8 +79,10 @@ def _trace(
 ) -> tuple[float, Ints, Floats]:
     """Follow the shortest path from an end, number `end` of `places`, back to the sources.
 
-    Returns its length, infinite if there is none, and for its points (k,) faces and (k, 3) barycentric coordinates.
+    Each step leads from the last point, through one of its faces, to the source, corner or side by which it is nearest.
+    Returns the length, infinite if there is no path, and for its points (k,) faces and (k, 3) barycentric coordinates.
     """
+    # faces that contain the last point, and its position in each
     at_faces = places.faces[places.first[end] : places.first[end + 1]].copy()
     at_points = places.points[places.first[end] : places.first[end + 1]].copy()
     edge, vertex = np.int64(-1), np.int64(-1)  # on which the last point lies
@@ -89,6 +91,7 @@ def _trace(
     shares.pop()
     while steps > 0:
         steps -= 1
+        # the nearest way on: its length, kind, face, corner or side, and where it leads
         best, kind, face, k, position = np.inf, DONE, 0, 0, 0j
         for i in range(len(at_faces)):
             f, x = at_faces[i], at_points[i]
@@ -121,6 +124,7 @@ def _trace(
             return np.inf, np.array(path_faces), np.array(shares).reshape(-1, 3)
         if total == np.inf:
             total = best
+        # record the next point by its barycentric coordinates, which are areas
         corners = faces.positions[face]
         whole = cross(corners[1] - corners[0], corners[2] - corners[0])
         path_faces.append(face)
@@ -134,6 +138,7 @@ def _trace(
                 shares.append(max(cross(a, b) / whole, 0.0))
         if kind == AT_SOURCE:
             return total, np.array(path_faces), np.array(shares).reshape(-1, 3)
+        # the faces of the next point
         if kind == AT_VERTEX:
             edge, vertex = np.int64(-1), faces.vertices[face, k]
             around = faces.corners[faces.first_corner[vertex] : faces.first_corner[vertex + 1]]

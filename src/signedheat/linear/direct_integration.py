@@ -76,6 +76,7 @@ class DirectIntegration(Frozen):
         group = levels.groups
         bound = np.flatnonzero(np.bincount(group)[group] > 1)  # a group of one sample constrains nothing
         rows, values, group = rows[bound], values[bound], np.unique(group[bound], return_inverse=True)[1]
+        # one group of each component keeps its level; constants of the others are such that their multipliers sum to 0
         fixed = group[np.unique(self._component_of(rows), return_index=True)[1]]
         free = np.setdiff1d(group, fixed)
         held = np.flatnonzero(np.isin(group, free))
@@ -125,6 +126,7 @@ class DirectIntegration(Frozen):
         def pull(displacements: Floats) -> Floats:
             return factor.solve(spring * (rows.T @ displacements))
 
+        # each round steps to the minimum of the augmented Lagrangian, and `gap` is what the constraints are missed by
         values, multipliers = np.zeros_like(forces), np.zeros_like(levels)
         gap, worst, slow = levels, np.inf, False
         for _ in range(12):
@@ -245,7 +247,8 @@ class SpringIntegration(DirectIntegration):
             return self._reached(fitted, rows)
         held = springs > 0
         groups, parts = levels.groups[held], self._component_of(rows[held])
-        first = groups[np.unique(parts, return_index=True)[1]]  # one group of each part keeps its level
+        # one group of each part keeps its level; constants of the others are such that their forces sum to 0
+        first = groups[np.unique(parts, return_index=True)[1]]
         free = np.setdiff1d(groups, first)
         if len(free):
             chosen = np.flatnonzero(np.isin(levels.groups, free))

@@ -103,7 +103,8 @@ def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Fl
     """Compute the IC(0) factor in place, and return whether all pivots are positive.
 
     `factor` has the strictly lower triangle by rows, the CSR matrix with `indptr` and sorted `indices`, and `pivots`,
-    (n,), the diagonal, which becomes the inverse diagonal of the factor.
+    (n,), the diagonal, which becomes the inverse diagonal of the factor. Row by row, ``L_ij = (A_ij − Σ_k L_ik L_jk) /
+    L_jj`` for the entries of A only, and ``L_ii² = A_ii − Σ_j L_ij²``.
     """
     for i in range(len(pivots)):
         diagonal = pivots[i]
@@ -111,6 +112,7 @@ def _factorize(indptr: NDArray[np.int32], indices: NDArray[np.int32], factor: Fl
         for k in range(indptr[i], indptr[i + 1]):
             j = indices[k]
             value = factor[k]
+            # entries of rows i and j in the same columns
             p, q = indptr[i], indptr[j]
             while p < k and q < indptr[j + 1]:
                 if indices[p] == indices[q]:
@@ -140,7 +142,7 @@ def _precondition(
     """
     n, width = r.shape
     z = np.empty((n, width))
-    for i in range(n):
+    for i in range(n):  # L y = r, by the rows of L
         for c in range(width):
             z[i, c] = r[i, c]
         for k in range(indptr[i], indptr[i + 1]):
@@ -148,7 +150,7 @@ def _precondition(
                 z[i, c] -= factor[k] * z[indices[k], c]
         for c in range(width):
             z[i, c] *= pivots[i]
-    for i in range(n - 1, -1, -1):
+    for i in range(n - 1, -1, -1):  # Lᵀ z = y, by the columns of Lᵀ
         for c in range(width):
             z[i, c] *= pivots[i]
         for k in range(indptr[i], indptr[i + 1]):

@@ -31,9 +31,9 @@ def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
     n = len(starts) - 1
     order = np.arange(n)
     region = np.zeros(n, dtype=np.int64)  # the unfinished region that each unknown lies in
-    level = np.empty(n, dtype=np.int64)
+    level = np.empty(n, dtype=np.int64)  # and its distance, in links, from the seed of the search there
     queue = np.empty(n, dtype=np.int64)
-    stack = [(0, n)]
+    stack = [(0, n)]  # the parts of `order` that are regions still to be divided
     regions = 1
     while len(stack) > 0:
         begin, end = stack.pop()
@@ -42,7 +42,7 @@ def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
         current = region[order[begin]]
         seed = order[begin]
         depth, reached = -1, 0
-        while True:
+        while True:  # search again from the farthest unknown, as long as it gets farther
             for p in range(begin, end):
                 level[order[p]] = -1
             reached = _levels(starts, neighbors, region, current, seed, level, queue, 0)
@@ -67,6 +67,7 @@ def _dissect(starts: NDArray[np.int32], neighbors: NDArray[np.int32]) -> Ints:
         last = level[queue[reached - 1]]
         if last < 2:
             continue
+        # the separator, without the unknowns that have no neighbour beyond it
         cut = _thinnest(level, queue, reached, last)
         for p in range(reached):
             i = queue[p]

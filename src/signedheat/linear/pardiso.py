@@ -126,6 +126,7 @@ class _Call:
         self._lock, self._is_released = threading.Lock(), False
         self.values = upper.data
         self.indptr, self.indices = upper.indptr.astype(index, copy=False), upper.indices.astype(index, copy=False)
+        # settings are entries of the array `iparm` of PARDISO's manual
         self._integer = ctypes.c_longlong if wide else ctypes.c_int
         self._kind, self._n = _POSITIVE_DEFINITE[upper.dtype], upper.shape[0]
         self._order = np.zeros(1, dtype=index) if order is None else np.ascontiguousarray(order, dtype=index)

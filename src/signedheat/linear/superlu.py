@@ -80,6 +80,7 @@ def _substitute(
     """Replace the right-hand side x, (n,), by the solution y of ``L D Lᴴ y = x``, with the (n,) `pivots` D.
 
     Entries ``starts[j]`` to ``starts[j + 1]`` of `lower` and `rows` are column j of L and its rows, the diagonal first.
+    First x becomes D⁻¹ L⁻¹ x, column by column, and then y, from the last row of Lᴴ to the first.
     """
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
@@ -98,7 +99,7 @@ def _substitute_columns(
 ) -> None:
     """Replace the right-hand sides x, (n, k), by the solutions y of ``L D Lᴴ y = x``; L is stored by columns.
 
-    Each entry of L is read once for all right-hand sides.
+    It is `_substitute` for several columns: each entry of L is read once for all right-hand sides.
     """
     for j in range(len(pivots)):
         for k in range(starts[j] + 1, starts[j + 1]):
