@@ -413,7 +413,7 @@ class Dipoles:
 
     def _adjoint(self, charges: Floats) -> Floats:
         """Multiply (n,) charges at the dipoles by the transpose of W: (k,) fluxes of their field through the pieces."""
-        away = self.points - self.balls[1, :3]
+        away = self.points - self.balls[1, :3]  # from the middle of the root, so that moments can be added
         nodes = self._sums(np.c_[charges, charges[:, None] * away])
         nodes[:, 1:] -= nodes[:, :1] * (self.balls[:, :3] - self.balls[1, :3])  # moments about the middles of nodes
         field = self._at_dipoles(partial(_fields, self._walk, charges, nodes))
@@ -450,7 +450,8 @@ class Dipoles:
 def links_of(points: Floats, normals: Floats, owners: Ints) -> Links:
     """Link (n, 3) samples with neighbours on other pieces that lie roughly in one plane with them.
 
-    `normals` are (n, 3) unit vectors, and `owners` the (n,) pieces that samples lie on.
+    `normals` are (n, 3) unit vectors, and `owners` the (n,) pieces that samples lie on. Links are strong where normals
+    are parallel, and the direction to the neighbour is perpendicular to both; from 30° on they are 0.
     """
     n, k = len(points), min(PLANE_NEIGHBORS, len(points) - 1)
     near = PointTree(points).query(points, k + 1)[1].reshape(n, -1)[:, 1:]
@@ -510,7 +511,7 @@ def _nodes_for(points: Floats, balls: Floats, together: int) -> tuple[Ints, NDAr
         stack[0], depth = 1, 1
         while depth > 0:
             depth -= 1
-            node, near = stack[depth], 0
+            node, near = stack[depth], 0  # near: number of points for which the node is not one dipole
             ax, ay, az, square = balls[node, 0], balls[node, 1], balls[node, 2], balls[node, 3]
             for k in range(together):
                 dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
@@ -585,6 +586,7 @@ def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floa
         for node in nodes[starts[group] : starts[group + 1]]:
             if node > 0:
                 ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
+                # the field c d / r³ of a charge, and 3 (d · m) d / r⁵ − m / r³ of a dipole moment
                 charge, mx = sums_below[node, 0], sums_below[node, 1]
                 my, mz = sums_below[node, 2], sums_below[node, 3]
                 for k in range(together):

@@ -41,7 +41,11 @@ FAR_FIELD = 10
 
 
 def winding_numbers(samples: AreaSamples) -> Floats:
-    """Compute (nx, ny, nz) winding numbers, smoothed over two cells, at the nodes of the grid of some samples."""
+    """Compute (nx, ny, nz) winding numbers, smoothed over two cells, at the nodes of the grid of some samples.
+
+    They solve Poisson's equation with the divergence of the area vectors as right side. The flux through the walls of
+    the grid, and the constant, are those of the field of the area vectors as dipoles in free space.
+    """
     shape, spacing = np.array(samples.nodes.shape[1:]), samples.nodes.steps[1:]
     nodes, vectors = samples.nodes.nonzero()
     nodes = nodes[:, 1:]
@@ -132,7 +136,8 @@ def _refined(values: Floats, shape: tuple[int, ...], axis: int) -> Floats:
 def _far_field(points: Floats, dipoles: Floats, strengths: Floats, axis: int, core: float) -> tuple[Floats, Floats]:
     """(k,) winding number due to dipoles at (k, 3) points, and (k,) its derivative along an axis.
 
-    Dipoles have (d, 3) positions and (d, 3) area vectors `strengths`; within `core` of one its field is bounded.
+    Dipoles have (d, 3) positions and (d, 3) area vectors `strengths`; within `core` of one its field is bounded. The
+    winding number of a dipole a at a vector r from the point is ``a · r / 4π |r|³``.
     """
     value, slope = np.zeros(len(points)), np.zeros(len(points))
     for i in range(len(points)):

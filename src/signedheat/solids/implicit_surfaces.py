@@ -95,6 +95,7 @@ class NodePlanes:
 
         The planes are weighted trilinearly, but where a sharp edge passes the cell, only one of them counts.
         """
+        # the eight nodes of the cell of each point, their weights, and the heights of their planes at the point
         cells = (points - self.origin) / self.spacing
         base = np.clip(np.floor(cells).astype(np.int64), 0, np.array(self.values.shape) - 2)
         shares = (cells - base)[:, None]  # (n, 1, 3) positions in the cells, from 0 to 1
@@ -341,8 +342,9 @@ def _slopes(values: Floats, axis: int) -> tuple[Floats, Floats]:
     the node is in the middle of the parabola.
     """
     v = np.moveaxis(values, axis, 0)
-    if len(v) < 3:
+    if len(v) < 3:  # a straight line
         return np.broadcast_to(np.moveaxis(v[1:] - v[:1], 0, axis), values.shape), np.zeros(values.shape)
+    # second difference of each parabola, and its slope at its middle node
     bends, middle = v[2:] - 2 * v[1:-1] + v[:-2], 0.5 * (v[2:] - v[:-2])
     least, sides, slopes = np.full(v.shape, np.inf), np.zeros(v.shape), np.empty_like(v)
     for shift in (0, -1, 1):  # shift of the parabola's middle node; 0 unless another parabola bends less

@@ -313,7 +313,7 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
     if n == len(lid.vertices):
         return lid
     rim = lid.vertices[:n]
-    # rest: m κ without m; load: the terms with g
+    # κ of all vertices, and the terms with −g_e
     rest, load = _extended(stiffness(lid), held * curvatures), _load(rim, normals)
     lengths = side_lengths(rim)
     springs = (1.0 / np.maximum(held, 1e-9) - 1.0) * 0.25 * width * 0.5 * (lengths + np.roll(lengths, 1))
@@ -328,7 +328,7 @@ def plate(lid: Lid, normals: Floats, curvatures: Floats, held: Floats, width: fl
         weights = 1.0 / weights
         # weighted least squares for the inner vertices x: the residual is inner · x + known
         known = matrix[:, :n] @ rim - (areas * rest)[:, None] * up
-        known[:n] += load  # the terms with −g_e
+        known[:n] += load
         inner = matrix[:, n:]
         normal_matrix = (inner.T @ sparse.diags_array(weights) @ inner).tocsc()
         vertices = lid.vertices.copy()

@@ -313,14 +313,14 @@ def _diameters(tree: FaceTree, facing: Floats, points: Floats, normals: Floats) 
     extent = float(np.linalg.norm(upper - lower))
     least = COINCIDENT_FACES * float(np.abs(tree.tree.bounds[1]).max())
 
-    # least and greatest components of the normals of all faces below each node
-    ways = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
+    # least and greatest components of the normals of all faces below each node: a tree of their "positions"
+    normal_bounds = BoxTree.in_order(facing, facing, tree.tree.items[: len(facing)]).bounds
 
     def measured(rays: Floats) -> tuple[Floats, Ints]:
         """Measure the same for (k, 6) points and their normals."""
         diameters, touched = np.full(len(rays), extent), np.zeros(len(rays), dtype=np.int64)
         rows, boxes = tree.features.rows, tree.tree
-        _descend(rows, facing, boxes.bounds, tree.discs, ways, boxes.items, rays, least, diameters, touched)
+        _descend(rows, facing, boxes.bounds, tree.discs, normal_bounds, boxes.items, rays, least, diameters, touched)
         return diameters, touched
 
     diameters, touched = in_chunks(measured, np.column_stack([points, normals]))
@@ -336,6 +336,7 @@ def _normals_at(triangles: Floats, faces: Ints, points: Floats) -> Floats:
     flat, pairs = unit(area_vectors(triangles)), edge_table(ids).pairs
     pairs = pairs[np.einsum("ij,ij->i", *flat[pairs // 3].swapaxes(0, 1)) > np.cos(CREASE_ANGLE)]
     following = np.roll(np.arange(ids.size).reshape(-1, 3), -1, axis=1).ravel()
+    # corners at one vertex are in one fan if their faces are connected by edges that are not sharp
     first, second = pairs.T
     fans = connected_components(ids.size, np.append(first, following[first]), np.append(following[second], second))
     corners = unit(sums_of(corner_normals(triangles), fans, ids.size))[fans].reshape(-1, 3, 3)
@@ -354,18 +355,18 @@ def _descend(
     facing: Floats,
     bounds: Floats,
     discs: Floats,
-    ways: Floats,
+    normal_bounds: Floats,
     items: Ints,
     points: Floats,
-    least: float,
+    coincident: float,
     out: Floats,
     touched: Ints,
 ) -> None:
     """Shrink the diameters in `out` at (n, 6) points and their normals until no wall reaches into a ball.
 
     `touched` becomes the face that each ball touches. `rows` are those of `FaceFeatures`, `facing` the (m, 3) normals
-    of walls, and `bounds`, `discs`, `ways` (bounds of normals) and `items` those of a search tree. Points nearer than
-    `least` to a face coincide with it.
+    of walls, and `bounds`, `discs` and `items` those of a search tree; `normal_bounds`, (2 · leaves, 6), are the bounds
+    of the normals below its nodes. Points nearer than `coincident` to a face coincide with it.
 
     In the first round walls may reach in by `ROUND_WALL`, since a ball that fits a round wall touches all of it. In
     each further round, near the point that the ball touches, they may do so by `FINER` times as much.
@@ -378,6 +379,7 @@ def _descend(
         while slack > SETTLED:
             stack[0], depth = 1, 1
             while depth > 0:
+                # leave out nodes that the ball does not reach, or only farther than `reach` from where it touches
                 depth -= 1
                 node = stack[depth]
                 radius = 0.5 * diameter
@@ -385,11 +387,13 @@ def _descend(
                 limit = radius * radius * (1.0 - slack)
                 if not _square(bounds, node, mx, my, mz) < limit or _square(bounds, node, tx, ty, tz) > reach:
                     continue
+                # nodes whose faces are no walls, since all normals are too near that of the point
                 least_cosine = 0.0
                 for k, along in ((0, nx), (1, ny), (2, nz)):
-                    least_cosine += min(along * ways[node, k], along * ways[node, 3 + k])
+                    least_cosine += min(along * normal_bounds[node, k], along * normal_bounds[node, 3 + k])
                 if least_cosine >= OPPOSITE_SIDES:
                     continue
+                # and nodes whose disc the ball does not reach
                 if discs[node, 7] >= 0.0:
                     dx, dy, dz = mx - discs[node, 0], my - discs[node, 1], mz - discs[node, 2]
                     along = dx * discs[node, 3] + dy * discs[node, 4] + dz * discs[node, 5]
@@ -408,6 +412,7 @@ def _descend(
                     f = items[item]
                     if f < 0 or not facing[f, 0] * nx + facing[f, 1] * ny + facing[f, 2] * nz < OPPOSITE_SIDES:
                         continue
+                    # shrink the ball to the one through the point of the face nearest to its centre, until it is empty
                     best, qx, qy, qz = diameter, tx, ty, tz
                     for _ in range(60):
                         radius = 0.5 * best
@@ -417,7 +422,7 @@ def _descend(
                             break
                         dx, dy, dz = x - fx, y - fy, z - fz
                         ahead, square = dx * nx + dy * ny + dz * nz, dx * dx + dy * dy + dz * dz
-                        if not square > least * least or not ahead > 0.0:
+                        if not square > coincident * coincident or not ahead > 0.0:
                             best = diameter
                             break
                         if not square / ahead < best:
@@ -425,6 +430,7 @@ def _descend(
                         best, qx, qy, qz = square / ahead, fx, fy, fz
                     if best < diameter:
                         diameter, tx, ty, tz, touched[p] = best, qx, qy, qz, f
+            # walls that reach in by less are searched for near the point that the ball touches
             reach, slack = 4.0 * slack * diameter * diameter, slack * FINER
         out[p] = diameter
 
