@@ -76,6 +76,30 @@ one(1), two(2)"""
         assert done.stderr.count("signedheat: compiling what this needs") == wanted and done.stdout == ""
 
 
+def test_what_compiles_in_the_processes_of_a_batch_is_announced_once(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
+    environment.pop("NUMBA_DISABLE_JIT", None)
+    (tmp_path / "job.py").write_text(
+        """from signedheat.compiled import compiled
+@compiled
+def one(x):
+    return x
+def run(file, beginning):
+    return {"one": one(1)}"""
+    )
+    (tmp_path / "own.py").write_text(
+        """import job
+from signedheat import batches
+print([outcome.state for outcome in batches.run(["a.obj", "b.obj"], "out", job.run, workers=2).outcomes])"""
+    )
+    for name in ("a.obj", "b.obj"):
+        (tmp_path / name).write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    command = [sys.executable, "own.py"]
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "['done', 'done']\n"
+    assert done.stderr.count("signedheat: compiling what this needs") == 1
+
+
 @pytest.mark.parametrize("fault", [OSError("no space is left"), BrokenPipeError(), ValueError("a closed file")])
 def test_announcements_break_no_call_where_nobody_can_read_them(monkeypatch, fault):
     class Full(io.StringIO):

@@ -58,12 +58,17 @@ class Announcement:
 
     def __init__(self, text: str, everywhere: bool = False) -> None:
         self._text, self._everywhere, self.is_made = text, everywhere, False
+        self.pass_on: Callable[[], None] | None = None
+        """Function that is called in place of printing the message, in a process that works for another one."""
 
     def __call__(self) -> None:
         if self.is_made:
             return
         self.is_made = True
         logger.info(self._text)
+        if self.pass_on is not None:
+            self.pass_on()
+            return
         with suppress(OSError, ValueError):  # standard error is full, or closed
             is_terminal = sys.stderr is not None and sys.stderr.isatty()
             if self.are_wanted and sys.stderr and (self._everywhere or is_terminal or "ipykernel" in sys.modules):

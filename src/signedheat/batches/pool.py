@@ -24,6 +24,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from signal import SIG_IGN, SIGINT, Signals, signal
@@ -32,7 +33,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..compiled import remove_folders_of
+from ..compiled import announce, remove_folders_of
 from ..errors import FileFormatError, MemoryLimitError, SignedHeatError, counted, printable
 from ..io.files import move_into_place, replaceable, writing
 from ..io.shape_files import read, save
@@ -52,6 +53,8 @@ Done = tuple[Outcome, bool]
 """The outcome of a task, and whether memory may have run out, so that it may succeed after other processes ended."""
 PROCESS_DEATHS = (EOFError, OSError, pickle.UnpicklingError)
 """Exceptions that reading from or writing to a process raises if it has died."""
+COMPILING = "compiling"
+"""What a process answers, besides all else, when it begins to compile kernels."""
 THREAD_VARIABLES = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 """Environment variables that set the number of threads of a process."""
 
@@ -158,7 +161,7 @@ class Worker:
                 timer.start()
             process.stdin.write(message)  # type: ignore[union-attr]
             process.stdin.flush()  # type: ignore[union-attr]
-            done: Done | str = pickle.load(process.stdout)  # type: ignore[arg-type]
+            done: Done | str = _answer_of(process)
         except PROCESS_DEATHS:
             seconds, last = time.perf_counter() - begin, self.close()
             shutil.rmtree(task.scratch, ignore_errors=True)
@@ -180,7 +183,7 @@ class Worker:
         try:
             if self.is_closed:
                 raise EOFError
-            pickle.load(process.stdout)  # type: ignore[arg-type]
+            _answer_of(process)
         except PROCESS_DEATHS:
             if self.is_closed or tries == 1:
                 raise
@@ -225,6 +228,13 @@ class Worker:
         )
 
 
+def _answer_of(process: subprocess.Popen[bytes]) -> Any:
+    """Wait for what a process of `serve` answers, and announce meanwhile that it compiles, if it says so."""
+    while (answer := pickle.load(process.stdout)) == COMPILING:  # type: ignore[arg-type]
+        announce()
+    return answer
+
+
 _here = threading.local()
 """Holds one `Worker` for each thread of a Dask worker."""
 
@@ -239,25 +249,30 @@ def do_apart(task: Task, threads: int, time_limit: float | None) -> Done:
 def serve() -> None:
     """Run the tasks that arrive on standard input, as the main function of the process of a `Worker`.
 
-    Before each task it writes ``"ready"`` to standard output, and after it what `Task.attempt` returns.
+    Before each task it writes ``"ready"`` to standard output, and after it what `Task.attempt` returns. When it begins
+    to compile kernels, it writes `COMPILING`.
     """
     signal(SIGINT, SIG_IGN)  # the parent process handles it
     Announcement.are_wanted = False  # what is written to standard error explains failures
-    answers = os.fdopen(os.dup(1), "wb")
+    answers, writing_answer = os.fdopen(os.dup(1), "wb"), threading.Lock()
     os.dup2(2, 1)  # printed text must not mix with the answers
+
+    def answer(content: object) -> None:
+        """Send content to the parent process, from any thread."""
+        with writing_answer, suppress(BrokenPipeError):
+            pickle.dump(content, answers)
+            answers.flush()
+
+    announce.pass_on = partial(answer, COMPILING)
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("800")  # when memory runs out, the system should kill this process
     tasks: queue.Queue[Task | str] = queue.Queue()
     threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
     import_module(f"{__name__.partition('.')[0]}.public")  # so that imports do not count towards the time of a shape
-    with suppress(BrokenPipeError):
-        while True:
-            pickle.dump("ready", answers)
-            answers.flush()
-            task = tasks.get()
-            pickle.dump(task if isinstance(task, str) else task.attempt(), answers)
-            answers.flush()
-    os._exit(0)
+    while True:  # until the parent closes the pipe, which `_receive` notices
+        answer("ready")
+        task = tasks.get()
+        answer(task if isinstance(task, str) else task.attempt())
 
 
 def _receive(tasks: queue.Queue[Task | str]) -> None:
