@@ -309,8 +309,8 @@ def as_curve(triangles: IntrinsicMesh, placed: PlacedSegments) -> CurveSegments 
     ends = locate_points(triangles, np.tile(faces, 2), end_weights.reshape(-1, 3))
     points = locate_points(triangles, nodes.faces[alone], rounded(nodes.barycentric[alone]))
     located = concatenated([ends, points])
-    first, who = unique_points(located)
-    joined = who[: 2 * len(faces)].reshape(2, -1).T
+    first, numbers = unique_points(located)
+    joined = numbers[: 2 * len(faces)].reshape(2, -1).T
     steps = ((end_weights[1] - end_weights[0]) * corners).sum(axis=1)
     edges, _ = edges_between(triangles, faces, *end_weights)
     normals = 1j * np.where(edges < 0, steps, np.abs(steps))  # in the layout of the face, or in the frame of the edge

@@ -126,6 +126,7 @@ def path_through_vertices(
 
     `start` and `end` are one point each. Returns the points between them. Raises `SourceError` if there is no path.
     """
+    # the shortest path along edges, with the points as nodes n and n + 1, joined to the corners of their faces
     edges, n = triangles.edges, triangles.n_vertices
     arcs, lengths = [edges.vertices], [triangles.lengths_of_edges]
     for node, place in ((n, start), (n + 1, end)):
@@ -146,6 +147,7 @@ def path_through_vertices(
             remedy="make them two curves",
             element=f"face {start.faces[0]}",
         )
+    # its vertices at which it goes on in another component of faces; within components, paths are geodesics
     chain = concatenated([start, points_at_vertices(triangles, np.array(path[-2:0:-1])), end])
     step = np.arange(len(chain) - 1)
     part = triangles.face_components[shared_faces(triangles, chain[step], chain[step + 1])]
@@ -230,7 +232,7 @@ def unfold(faces: Faces, left: Ints, entered: Ints) -> tuple[Complexes, Ints, Co
     for i in range(len(left)):
         k, face, side = left[i] % 3, entered[i] // 3, entered[i] % 3
         portals[i, 0], portals[i, 1] = placed[k], placed[(k + 1) % 3]
-        same = np.int64(faces.forward[left[i] // 3, k] == faces.forward[face, side])
+        same = np.int64(faces.forward[left[i] // 3, k] == faces.forward[face, side])  # then one face is reversed
         over[i + 1] = over[i] ^ same
         a, b = portals[i, 1 - same], portals[i, same]
         placed[side], placed[(side + 1) % 3] = a, b

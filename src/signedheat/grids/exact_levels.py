@@ -42,6 +42,7 @@ def on_level(
     if len(points) > POINTS_AT_ONCE:
         parts = np.split(points, range(POINTS_AT_ONCE, len(points), POINTS_AT_ONCE))
         return np.concatenate([on_level(distance, part, values, origin, spacing, level) for part in parts])
+    # the edge of each point, and the values at its ends, above the level
     base = np.floor(points).astype(np.int64)
     fraction = points - base
     axis = fraction.argmax(axis=1)

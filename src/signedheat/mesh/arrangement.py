@@ -97,6 +97,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
     """
     slacks = tolerances(points, faces, SAME_POINT) if slacks is None else slacks
     pairs = meeting_faces(points, faces, slacks) if pairs is None else pairs
+    # weld the corners of faces that may meet, and drop those faces that are thin
     busy = np.unique(faces[pairs.ravel()])
     reaches = _reaches(len(points), faces, slacks)
     faces = _welded(points, busy, reaches)[faces]
@@ -109,6 +110,7 @@ def arranged(points: Floats, faces: Ints, pairs: Ints | None = None, slacks: Flo
     table = edge_table(faces)
     on_open = _on_open_edges(points, table, reaches)
 
+    # the points in which faces meet, on lines and in faces; then the lines along which they do, and where these cross
     meetings, positions, meeting_slacks = _meetings(
         read_only(np.ascontiguousarray(points)), faces, table.vertices, table.face_edges, pairs, slacks
     )

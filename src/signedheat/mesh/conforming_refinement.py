@@ -73,6 +73,8 @@ def affected_elements(triangles: IntrinsicMesh, merged: MergedSources, unfit: Se
 
     A face with a split edge is cut, too. A cut face splits the edges on which segments in it end.
     """
+    # a graph of the faces, 0 to m − 1, and the edges, from m on: arcs lead from what is cut to what must then be cut,
+    # and from one more node, the last, to what is cut at first
     nodes, inside, m = merged.nodes, merged.edges < 0, triangles.n_faces
     last = m + triangles.n_edges
     face, end = np.repeat(merged.faces[inside], 2), merged.ends[inside].ravel()

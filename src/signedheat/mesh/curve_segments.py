@@ -128,6 +128,7 @@ def joined_end_to_end(parts: Sequence[CurveSegments], may_go_on: Bools) -> tuple
     """
     merged = MergedSources.of(parts)
     bounds = np.cumsum([0, *(len(part.ends) for part in parts)])
+    # the first two and the last two nodes of each curve
     (tails, second), (last, heads) = merged.ends[bounds[:-1]].T, merged.ends[bounds[1:] - 1].T
     arriving = np.zeros(len(merged.nodes), dtype=np.int64)
     arriving[heads] = np.arange(len(parts))
@@ -156,6 +157,7 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     """
     merged = MergedSources.of(parts)
     faces, vectors = merged.faces, merged.vectors
+    # runs of segments in one face or along one edge, and how far nodes are from the line between the ends of the run
     node, before, after = _nodes_between(merged)
     run, first, last = _runs(len(faces), before, after)
     positions = np.stack([barycentric_in(triangles, faces, merged.nodes[end]) for end in merged.ends.T], axis=1)
@@ -164,6 +166,7 @@ def without_straight_nodes(triangles: IntrinsicMesh, parts: Sequence[CurveSegmen
     off = np.abs((np.conj(end - begin) * (positions[before, 1] - begin)).imag)
     bent = off > ZERO_COORDINATE * triangles.edge_lengths[faces[before]].max(axis=1) * np.abs(end - begin)
     bent &= merged.edges[before] < 0
+    # nodes of runs that are straight all along, where nothing else is
     straight = np.bincount(run[before], bent, len(first))[run[before]] == 0
     ends_at = np.bincount(np.concatenate([merged.ends.ravel(), *merged.samples]), minlength=len(merged.nodes))
     # each passing line has two segment ends and one sample there
@@ -184,6 +187,7 @@ def _nodes_between(merged: MergedSources) -> tuple[Ints, Ints, Ints]:
 
     Also returns the segments before and after each of these nodes. Closed runs of segments keep one node.
     """
+    # places are nodes of one source each; the segments that arrive there and leave, if there is one of each
     k = len(merged.ends)
     of_source = merged.owners[:, None] * len(merged.nodes) + merged.ends
     places, index = np.unique(of_source, return_inverse=True)

@@ -126,6 +126,7 @@ class EdgeTable(Frozen):
         number of faces that run along the edge less that of faces that run against it, which is not 0. They are sorted
         by group and edge.
         """
+        # edges to count: those at which all faces together, or faces of several groups, may leave something
         n, edges, owners = len(self.vertices), self.face_edges.ravel(), np.repeat(groups, 3)
         ways = (np.where(self.forward, 1, -1) * np.reshape(weights, (-1, 1))).ravel()
         is_open, last = np.bincount(edges, ways, n) != 0, np.empty(n, dtype=np.int64)

@@ -241,6 +241,7 @@ def face_pairs(triangles: IntrinsicMesh) -> FacePairs:
     edge = triangles.edges.face_edges.ravel()
     starts, order = triangles.edges.halfedges
     count = np.diff(starts)
+    # each halfedge with the next one of its edge; of two, one pair is enough
     halfedges = np.stack([order, order[next_in_groups(starts)]], axis=1)
     around = count[edge[order]]
     halfedges = halfedges[(around > 2) | ((around == 2) & (halfedges[:, 0] < halfedges[:, 1]))]

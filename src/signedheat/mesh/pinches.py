@@ -52,6 +52,7 @@ def separated(points: Floats, faces: Ints, overlapping: bool = False) -> tuple[F
     around[crowded] = _sorted_by_angle(points, faces, table.vertices[edges[halfedges[crowded]]], halfedges[crowded])
     labels = connected_components(len(faces), *table.pairs.T // 3) if overlapping else np.arange(len(faces))
     partners = _partners(starts, table.forward.ravel()[around], labels[around // 3])
+    # corners are of one vertex if they are connected across the edges of pairs, which run opposite ways
     paired = partners >= 0
     leaving, entering = around[paired], around[partners[paired]]
     leaving_next, entering_next = (3 * (h // 3) + (h + 1) % 3 for h in (leaving, entering))

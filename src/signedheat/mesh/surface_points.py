@@ -181,6 +181,7 @@ def shared_faces(triangles: IntrinsicMesh, start: LocatedPoints, end: LocatedPoi
     """
     shared = np.where(contain(triangles, end.faces, start), end.faces, -1)
     shared = np.where(contain(triangles, start.faces, end), start.faces, shared)
+    # points on edges and at vertices are in more faces than those in which they are given
     left = np.flatnonzero((shared < 0) & (start.kinds != FACE))
     if len(left):
         owners, faces = incident_faces(triangles, start[left])
@@ -202,6 +203,7 @@ def incident_faces(triangles: IntrinsicMesh, located: LocatedPoints) -> tuple[In
         members = np.flatnonzero(located.kinds == kind)
         if not len(members):
             continue
+        # all corners or sides of faces that are elements of these points
         starts, members_at = grouped(located.elements[members], count)
         face, corner = np.nonzero((np.diff(starts) > 0)[table])
         row, point = members_of(starts, members_at, table[face, corner])

@@ -107,6 +107,7 @@ def inside_out(mesh: TetShapes) -> Bools:
     disagree = np.bincount(faces.tet_faces.ravel(), way.ravel(), len(faces.vertices)) != 0
     tet, k = np.nonzero(faces.tet_counts[faces.tet_faces] == 2)
     other = np.where(disagree[faces.tet_faces[tet, k]], m, 0) + faces.neighbors[tet, k]
+    # the graph has each tet k twice, as it is, k, and inverted, k + m: tets that agree are connected
     as_given, turned = connected_components(
         2 * m, np.append(tet, tet + m), np.append(other, (other + m) % (2 * m))
     ).reshape(2, m)

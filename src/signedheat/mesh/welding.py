@@ -119,6 +119,7 @@ def joined_copies(points: Floats, faces: Ints) -> Ints:
     if not len(faces) or (owners == owners[0]).all():
         return places
     reaches = _reaches(points, parts, tails, heads, ONE_PLACE)[parts]
+    # duplicates of faces of other parts, once points that only rounding separates are one
     near = welded_within(points, reaches)
     if (near == places).all():
         return places
@@ -126,6 +127,7 @@ def joined_copies(points: Floats, faces: Ints) -> Ints:
     copies = (first >= 0) & (owners[first] != owners)
     if not copies.any():
         return places
+    # but not of parts with points that are near each other, yet farther apart than that
     used = np.unique(faces)
     wide, labels = welded_within(points, SEAM_UNITS / ONE_PLACE * reaches)[used], parts[used]
     firsts = distinct_rows(np.stack([wide, near[used]], axis=1))[1]
@@ -174,6 +176,7 @@ def welded_within(points: Floats, reaches: Floats) -> Ints:
     Returns (n,) the point into which each is merged, or its own index. Reaches are rounded to powers of four times the
     largest reach, or to powers of a larger number if that leaves more than `MOST_REACHES` different ones.
     """
+    # a point of level k reaches 4⁻ᵏ of the largest reach, along each axis
     reaches = np.broadcast_to(reaches[:, None] if reaches.ndim == 1 else reaches, points.shape)
     largest = reaches.max(axis=0, initial=0.0)
     with np.errstate(divide="ignore", invalid="ignore"):

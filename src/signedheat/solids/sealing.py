@@ -48,9 +48,9 @@ CORNER_DEPTH = 2.0
 class Flood:
     """Where the centre of a ball can be that comes from outside."""
 
-    tree: FaceTree
-    radius: float
-    spacing: float
+    tree: FaceTree  # of the faces
+    radius: float  # radius of the ball
+    spacing: float  # spacing of the grid that is flooded
     border: PointTree  # centres of flooded cells next to others
 
     @classmethod
@@ -65,6 +65,7 @@ class Flood:
             lambda n: BYTES_OF_FLOOD * n,
             lambda _: "seal wider openings only",
         )
+        # where a ball is free, by the distance of the middle of each block, or node by node where that is unclear
         blocks = counts.astype(int)
         tree = FaceTree.of_triangles(triangles)
         free = np.zeros((*blocks, BLOCK, BLOCK, BLOCK), dtype=bool)
@@ -76,6 +77,7 @@ class Flood:
         for rows in np.array_split(near := np.flatnonzero(np.abs(rough - radius) <= reach), 1 + len(near) // 2048):
             points = lower + spacing * (corners[rows][:, None] + within).reshape(-1, 3)
             free.reshape(len(corners), -1)[rows] = (tree.distances(points) > radius).reshape(len(rows), -1)
+        # the part of this that is connected with the corner of the grid
         nodes = free.transpose(0, 3, 1, 4, 2, 5).reshape(blocks * BLOCK)
         labels, _ = scipy.ndimage.label(nodes)
         outside = labels == labels[0, 0, 0]
@@ -111,6 +113,7 @@ def sealed(mesh: TriangleMesh, length: float) -> tuple[TriangleMesh, Ints, LeftO
             remedy="seal openings of about the size of the shape or less",
             element="seal",
         )
+    # which sides of the pieces a ball touches at the middle of a part, and which pieces are shallow all over
     pieces = arranged(mesh.vertices, mesh.faces)
     triangles = pieces.points[pieces.faces]
     flood = Flood.around(triangles, length)

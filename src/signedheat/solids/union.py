@@ -87,6 +87,7 @@ def united(
     With `keep_overlaps`, given faces inside the solid are kept, too. Confidence in added faces falls with their
     distance from (n, 3) `points`, or else from the corners of given faces.
     """
+    # cut where faces cross, and find on which sides of the pieces the inside lies
     whole = joined_surfaces(surfaces)
     closing = np.concatenate([np.full(len(surface.triangles), surface.closing) for surface in surfaces])
     windings = Windings(whole.triangles if closing.all() else whole.triangles[closing])
@@ -99,6 +100,7 @@ def united(
     closes = closing[pieces.origins]
     # winding numbers do not change across sheets
     behind[~closes], ahead[~closes] = windings.sides(triangles[~closes])
+    # keep what bounds the inside, and given faces that are neither inside nor copies
     origins = whole.origins[pieces.origins]
     given = origins >= 0
     buried = behind & ahead
