@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats
 
 Operator = Callable[[Floats], Floats]
+"""A linear map of (n,) or (n, k) vectors to such vectors."""
 
 
 def conjugate_gradients(

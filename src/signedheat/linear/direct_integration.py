@@ -43,6 +43,7 @@ class DirectIntegration(Frozen):
     spring: float = 1e8
     """ρ of the augmented Lagrangian for exact constraints, relative to the largest diagonal entry of C. A larger one
     needs fewer rounds, and worsens the condition of the matrix."""
+    # factors: the last one with springs, and the last one of each sparsity pattern, whose memory is used again
     _pulled: LastUsed[bytes, Factor] = field(default_factory=LastUsed, init=False, repr=False)
     _of_this_pattern: LastUsed[bytes, list[Factor]] = field(default_factory=LastUsed, init=False, repr=False)
 

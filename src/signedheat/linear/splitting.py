@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Map = Callable[[NDArray[Any]], NDArray[Any]]
+"""A function of one vector, as `split_rounds` describes."""
 
 
 class Round(NamedTuple):

@@ -47,8 +47,8 @@ class Arrangement(NamedTuple):
 class Incidence(NamedTuple):
     """Points that lie on lines or in faces, as sorted pairs of owner (line or face) and point, without duplicates."""
 
-    owners: Ints
-    points: Ints
+    owners: Ints  # (k,) ids of lines or of faces, ascending
+    points: Ints  # (k,) ids of points
 
     @classmethod
     def of(cls, *pairs: tuple[Ints, Ints]) -> Incidence:
@@ -209,10 +209,11 @@ def _members(faces: Ints, table: EdgeTable, lines: Lines, chosen: Ints) -> Incid
 
 
 class Records(NamedTuple):
-    """Parts of lines that lie in faces: (r,) ids of the face, of the line, and of the points at both ends."""
+    """r parts of lines that lie in faces."""
 
-    faces: Ints
-    lines: Ints
+    faces: Ints  # (r,) the face
+    lines: Ints  # (r,) the line
+    # (r,) the points at both ends of the part
     tails: Ints
     heads: Ints
 

@@ -52,6 +52,7 @@ class BoxTree(NamedTuple):
         boxes[:, 3:] = -np.inf
         boxes[:n, :3], boxes[:n, 3:] = lower[items[:n]], upper[items[:n]]
         bounds[0] = 0
+        # nodes of a level from those below them, or from their boxes, up to the root
         level, below = leaves, boxes.reshape(leaves, BOXES_PER_LEAF, 6)
         while level:
             bounds[level : 2 * level, :3] = boxes_around(below[..., :3])[0]

@@ -26,7 +26,9 @@ from .planar_triangulation import triangulate_crossing
 from .surface_points import EDGE, FACE, VERTEX, ZERO_COORDINATE, LocatedPoints, barycentric_on_edges, points_at_vertices
 
 Point = tuple[float, float]
+"""A point of a face, in coordinates in which the corners are `CORNERS`."""
 Edge = tuple[int, int]
+"""The indices of both ends of an edge among the points of a face."""
 
 CORNERS: tuple[Point, Point, Point] = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
 """Corners of a face in the coordinates in which it is triangulated."""
@@ -335,9 +337,10 @@ class NewFace(NamedTuple):
 class NewSegment(NamedTuple):
     """A segment of a source, or a part of one. If it runs along an edge, `face` has no meaning."""
 
-    start: int  # nodes at its ends
+    # nodes at its ends
+    start: int
     end: int
-    face: int
+    face: int  # the face that contains it
     edge: int  # −1 inside a face
     vector: complex  # normal times length, as in `CurveSegments`
     owner: int  # its source

@@ -64,7 +64,8 @@ class MergedSources:
 
     nodes: LocatedPoints  # (s,) distinct points of all sources
     ends: Ints  # (k, 2) nodes of each segment
-    faces: Ints  # (k,) as edges and vectors, with the meaning that they have in `CurveSegments`
+    # (k,) face, edge or −1, and normal times length of each segment, as in `CurveSegments`
+    faces: Ints
     edges: Ints
     vectors: Complexes
     owners: Ints  # (k,) the source of each segment

@@ -56,6 +56,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bool
     asked = np.ones(len(ids), dtype=np.bool_) if asked is None else asked[order]
     corners = vertices.take(ids, axis=0).reshape(-1, 9)
     triangles = Triangles(corners, ids, slacks)
+    # pairs in space, except those around hubs, which are found by directions from the hub
     pairs = _near(OrientedBoxes.of(corners, slacks, hubs, asked), triangles, False)
     fans = np.flatnonzero(hubs >= 0)
     if len(fans):

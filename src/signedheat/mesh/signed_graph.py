@@ -68,6 +68,7 @@ def best_signs(weights: Floats, first: Floats) -> Floats:
     links = Links(tails, heads, weights[tails, heads])
     vectors = eigh(weights, subset_by_index=[max(n - 2, 0), n - 1])[1].T
     starts = [first, signs_of(links, n), *np.where(vectors < 0, -1.0, 1.0)]
+    # the groups of all levels of merging, single nodes first
     levels = [np.arange(n)]
     for _, merged, _ in _contractions(_weights(links, n)):
         levels.append(merged[levels[-1]])

@@ -150,7 +150,7 @@ def _copies(faces: Ints, table: EdgeTable) -> Bools:
 class FaceTree:
     """Faces in a tree of boxes and discs, for finding the face nearest to a point."""
 
-    features: FaceFeatures
+    features: FaceFeatures  # the faces, with normals
     tree: BoxTree  # the tree of their boxes
 
     @classmethod

@@ -82,7 +82,7 @@ class Bounding(Frozen):
 class _Parts:
     """Connected parts of a chain that are not whole as given; loose triangles, which tell little, are one part."""
 
-    chain: Chain
+    chain: Chain  # the m triangles
     whole: Bools  # (m,) which triangles are in no part, since they are whole as given
     pieces: Ints  # (m,) piece, as given, of each triangle; −1 if it is in no part
     of_pieces: Ints  # (q,) part of each piece
@@ -156,11 +156,13 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     parts = _Parts.of(chain, given)
     best = parts.judged(decided)
     readings, chosen, overlapping = [given], np.zeros(len(whole), dtype=np.int64), False
+    # as given, but inside out
     if cone_volumes(chain.triangles, given.counts, parts.of_triangles + 1, len(parts.areas) + 1).sum() < 0:
         inside_out = _reversed(given)
         candidate = parts.judged(_decided(chain, inside_out, held, nested))
         if parts.areas @ candidate.missing < parts.areas @ best.missing - LEAST_GAIN * parts.areas.sum():
             readings, best = [inside_out], candidate
+    # other readings, of which `chosen` is the one that each triangle is read by so far, as an index
     by_once = once(chain)
     for trial in _trials(chain, parts, given, by_once, best.missing, nested):
         present, improvable = best, trial.parts & (best.missing >= trial.least)
@@ -182,6 +184,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
                 break
             improvable = better
         chosen = best_choice
+    # triangles that do not count are inner ones in pieces of which little else is unexplained
     decided, inside = best.decided, best.of_pieces < MOSTLY_WRONG
     inner = decided.inner | (~whole & ~decided.as_given & (decided.counts == 0) & inside[parts.pieces])
     decided = replace(decided, inner=inner, turned=decided.turned & ~inner)
@@ -373,7 +376,7 @@ def _nested(
 class OpenPieces(NamedTuple):
     """Open pieces that are decided about together."""
 
-    pieces: Pieces
+    pieces: Pieces  # p pieces, directed as they count
     clusters: Ints  # (p,) cluster of pieces that are near each other (`clusters_of`)
     groups: Ints  # (p,) connected group of each
     rims: Rims  # their boundary edges

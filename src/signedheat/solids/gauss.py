@@ -313,7 +313,7 @@ class Walk(NamedTuple):
     order: Ints  # (n,) the dipoles in the order of the tree; each `together` of them are a group
     starts: Ints  # (groups + 1,) where the nodes of each group begin in `nodes`
     nodes: NDArray[np.int32]  # see `_nodes_for`
-    together: int
+    together: int  # number of dipoles in a group
 
 
 @dataclass(frozen=True, eq=False)

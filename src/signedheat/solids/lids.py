@@ -114,6 +114,7 @@ class SmoothRim:
         sides = np.roll(corners, -1, axis=0) - corners
         starts, length = shares_of(corners)
         steps = np.diff(starts)[:, None]
+        # integral of the position along the loop, from the first corner to each corner
         sums = np.concatenate([np.zeros((1, 3)), np.cumsum(steps * (corners + 0.5 * sides), axis=0)])
 
         def integral(shares: Floats) -> Floats:
@@ -410,7 +411,7 @@ class _Run:
     """Consecutive sides that lie in a plane."""
 
     first: int  # index of the first side
-    count: int
+    count: int  # number of sides
     points: Ints  # (k,) their points, including the last
     opening: Floats  # (3,) area vector of a lid in the plane
 

@@ -43,6 +43,7 @@ def levels_within(triangles: Floats, groups: Ints, counts: Ints, faces: Ints) ->
     starts, order = grouped(labels, len(unique_groups))
     rank = np.argsort(order)
     corners = np.ascontiguousarray(triangles[order]).reshape(-1, 9)
+    # sums over all triangles where points or triangles are few, and else a tree for each group
     owners = labels[faces]
     summed = (np.bincount(owners)[owners] <= SUMMED_POINTS) | (np.diff(starts)[owners] <= TREE_FACES)
     levels, few = np.zeros(len(faces)), np.flatnonzero(summed)

@@ -280,6 +280,7 @@ def halves(solid: Solid, plane: Plane) -> tuple[Solid, Solid]:
     middle = corners.mean(axis=0)
     foot = middle - ((middle - plane.origin) @ plane.axes[2]) * plane.axes[2]
     room = 2.0 * float(np.linalg.norm(np.ptp(corners, axis=0)))
+    # a half space is a box with one side in the plane, and reaches beyond the solid
     steps = np.array(list(np.ndindex(2, 2, 2))) * np.array([2, 2, 1]) - np.array([1, 1, 0])
     sides = (foot + room * steps @ plane.axes)[np.concatenate([BOX_SIDES[:, [0, 1, 2]], BOX_SIDES[:, [0, 2, 3]]])]
     no_origins, full_confidence, all_bounding = (

@@ -186,12 +186,13 @@ def facing(rims: list[Rim], areas: Floats) -> list[tuple[int, int]]:
                 continue
             lids = float(np.linalg.norm(larger.opening) + np.linalg.norm(smaller.opening))
             if lids > LARGE_OPENING * areas[np.unique(np.concatenate([larger.parts, smaller.parts]))].sum():
-                (area, onward), (again, back) = _strip_areas(larger, smaller), _strip_areas(smaller, larger)
-                straight = (onward + back) / max(area + again, 1e-300)
+                # the area of the strip, estimated from both rims, and how straight it continues the surface, −1 to 1
+                (area, onward), (other_area, back) = _strip_areas(larger, smaller), _strip_areas(smaller, larger)
+                straight = (onward + back) / max(area + other_area, 1e-300)
                 same_part = len(np.unique(np.concatenate([larger.parts, smaller.parts]))) == 1
                 # rims of one part around each other, as of half a ring, have lids that would fill its hole
-                if area + again <= 2 * lids * (1 + straight if same_part else NARROW + (1 - NARROW) * straight):
-                    widths.append(((area + again) / lids, i, j))
+                if area + other_area <= 2 * lids * (1 + straight if same_part else NARROW + (1 - NARROW) * straight):
+                    widths.append(((area + other_area) / lids, i, j))
     best: list[tuple[int, int]] = []
     paired: set[int] = set()
     for _, i, j in sorted(widths):
