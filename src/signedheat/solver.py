@@ -21,7 +21,7 @@ from .method import diffuse, diffuse_many, integrate, integrate_many, normalize
 from .shapes.foreign import ForeignShape, as_list, converted
 from .shapes.kinds import AnySurface, Domain, Shapes, Sources, SpaceSources
 from .surfaces.extrapolation import Diffusion, Extrapolated, blended, default_diffusion, lowered_for_times
-from .surfaces.intrinsic_discretization import Retriangulated, checked_intrinsic, lowered_by_angles
+from .surfaces.intrinsic_discretization import Retriangulated, lowered_by_angles
 from .surfaces.intrinsic_triangulation import triangle_mesh
 from .surfaces.repaired_mesh import RepairedMesh
 from .surfaces.source_segments import given_curves, numbers_kept, one_sided
@@ -29,7 +29,7 @@ from .surfaces.surface_curves import CurvesAndPoints
 from .surfaces.surface_source import SurfaceSource
 from .surfaces.triangle_mesh import TriangleMesh
 from .tets.tet_mesh import TetMesh
-from .validation import callback, positive_number, public_call, refuse_pair_apart
+from .validation import callback, chosen, positive_number, public_call, refuse_pair_apart
 
 SOURCES_AT_ONCE = 16
 """Number of sources that `distance_many` diffuses at a time, which bounds its memory."""
@@ -118,7 +118,7 @@ class SignedHeatSolver(Frozen, Generic[AnyDomain]):
             discretize(self.domain)  # raises
         if not isinstance(self.diffusion, Extrapolated | None):
             object.__setattr__(self, "diffusion", positive_number(self.diffusion, "diffusion"))
-        checked_intrinsic(self.intrinsic)
+        chosen(self.intrinsic, Literal["auto", True, False], "intrinsic")
 
     @property
     def discretization(self) -> Adaptable:

@@ -267,10 +267,10 @@ def instance(value: object, kind: type, name: str) -> None:
 
 
 def chosen(value: object, choices: object, name: str) -> None:
-    """Raise an error unless `value` is one of the texts of the ``Literal`` type `choices`."""
+    """Raise an error unless `value` is one of the texts of the ``Literal`` type `choices`, or of its True and False."""
     allowed = get_args(choices)
-    if not isinstance(value, str) or value not in allowed:
-        listed = " or ".join(f'"{choice}"' for choice in allowed)
+    if not isinstance(value, str | bool) or value not in allowed:
+        listed = " or ".join(f'"{choice}"' if isinstance(choice, str) else str(choice) for choice in allowed)
         raise SignedHeatError(f"{name} must be {listed}, not {quoted(value)}", element=name)
 
 

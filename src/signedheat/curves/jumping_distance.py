@@ -35,14 +35,14 @@ from ..mesh.intrinsic_mesh import FacePairs, IntrinsicMesh, face_pairs
 from ..mesh.surface_points import VERTEX, barycentric_in
 from ..method import diffuse, normalize
 from ..shapes.foreign import ForeignShape, as_list, converted
-from ..surfaces.intrinsic_discretization import AUTO_ANGLE, COARSEST_TRIANGLE, checked_intrinsic, is_spoiled, lowered
+from ..surfaces.intrinsic_discretization import AUTO_ANGLE, COARSEST_TRIANGLE, is_spoiled, lowered
 from ..surfaces.intrinsic_triangulation import IntrinsicTriangulation, intrinsic_delaunay, triangle_mesh
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.source_segments import given_curves
 from ..surfaces.surface_curves import CurveOrPoints, CurvesAndPoints
 from ..surfaces.surface_discretization import SurfaceDiscretization, lowered_mesh, lowered_polygons
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import flag, positive_number, public_call
+from ..validation import chosen, flag, positive_number, public_call
 from .cut_surface import CutSurface
 from .jumps import JumpProblem, JumpSolution, high_jumps, integration_error, is_continuous, minimize, smoothed
 
@@ -155,7 +155,8 @@ def piecewise_distance(
             remedy="pass the curves first, then the surface",
             element="domain",
         )
-    smooth, intrinsic = flag(smooth, "smooth"), checked_intrinsic(intrinsic)
+    smooth = flag(smooth, "smooth")
+    chosen(intrinsic, Literal["auto", True, False], "intrinsic")
     if intrinsic is True:
         triangle_mesh(domain)  # refuses others
     listed, left_out = given_curves(domain, as_list(sources))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..diagnostics import IntrinsicTriangles
 from ..discretization import discretize
-from ..errors import GeometryError, SignedHeatError, quoted
+from ..errors import GeometryError
 from ..jobs import bound_progress
 from ..mesh.intrinsic_mesh import IntrinsicMesh, mollify
 from .intrinsic_triangulation import LARGEST_ANGLE, IntrinsicTriangulation, intrinsic_delaunay
@@ -87,13 +87,6 @@ def lowered_by_angles(domain: Any) -> Any:
         except GeometryError:
             pass
     return discretize(domain)
-
-
-def checked_intrinsic(intrinsic: bool | Literal["auto"]) -> bool | Literal["auto"]:
-    """Return the option `intrinsic` of `SignedHeatSolver` if it is valid, and raise `SignedHeatError` otherwise."""
-    if not (isinstance(intrinsic, bool) or (isinstance(intrinsic, str) and intrinsic == "auto")):
-        raise SignedHeatError(f"intrinsic must be 'auto', True or False, not {quoted(intrinsic)}", element="intrinsic")
-    return intrinsic
 
 
 def is_spoiled(mesh: TriangleMesh) -> bool:
