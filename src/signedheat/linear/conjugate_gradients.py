@@ -28,6 +28,7 @@ def conjugate_gradients(
     b)``, or if ``pᵀ A p ≤ 0`` for its direction p. All end after `limit` steps, or once ``converged(x, r)`` is true
     (Hestenes & Stiefel 1952).
     """
+    # the usual letters: residual r, z = P r, direction p, q = A p
     apply_p = precondition or np.copy
     x = np.zeros_like(rhs) if start is None else start.copy()
     r = rhs.copy() if start is None else rhs - operator(x)

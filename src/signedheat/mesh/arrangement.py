@@ -521,7 +521,7 @@ def _meetings(
     A meeting is a row of its kind and the ids of two elements: ON_EDGE, edge and vertex; IN_FACE, face and vertex;
     TWO_EDGES and both edges, the smaller id first; EDGE_AND_FACE, edge and face.
     """
-    meetings, positions, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]
+    meetings, positions, within = [(0, 0, 0)], [(0.0, 0.0, 0.0)], [0.0]  # the first entries tell types, and are dropped
     # of both faces of a pair: whether corner i lies on edge k of the other face, or anywhere on that face; whether edge
     # k meets the boundary of the other face; and the heights of corners above it
     touch, on = np.empty((2, 3, 3), np.bool_), np.empty((2, 3), np.bool_)

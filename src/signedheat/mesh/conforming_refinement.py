@@ -222,6 +222,7 @@ class FaceCutter:
         for k, side in enumerate(around):
             edge, forward = int(triangles.edges.face_edges[face, side]), bool(triangles.edges.forward[face, side])
             order = 1 if forward else -1
+            # the points of the side, without its end, and then the edges between them
             (x, y), (u, v), begin = CORNERS[k], CORNERS[(k + 1) % 3], len(result.points)
             result.points.append((x, y))
             result.vertices.append(int(triangles.corner_vertices[face, side]))

@@ -274,6 +274,7 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
     x: int = g.counts[N_VERTICES]
     a, b, c = g.tail[h], g.tail[h + 1], g.tail[h + 2]
     base = g.length[g.edge[h]]
+    # x in the plane of the face, in which a is at the origin, b at `base`, and c at `top`
     top = apex(g, h)
     position = v * base + w * top
     record(g, SPLIT_FACE, f, n, x, u, v, w, 1.0)
@@ -283,6 +284,7 @@ def split_face(g: Gluing, f: int, u: float, v: float, w: float) -> int:
         new_edge(g, abs(position - top), False),
     )
     g.counts[N_VERTICES], g.counts[N_FACES] = x + 1, n + 2
+    # halfedges h: a → b, k: b → c and l: c → a begin the three faces
     k, l = 3 * n, 3 * n + 3
     move(g, (h + 1, h + 2), (k, l))
     g.tail[k], g.tail[l] = b, c

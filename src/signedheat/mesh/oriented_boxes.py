@@ -167,7 +167,7 @@ def oriented_apart(oriented: Floats, a: int, b: int, slack: float) -> bool:
         c, d = (a, b) if t == 0 else (b, a)
         for k in range(3):
             u, v, w = oriented[c, 6 + 3 * k], oriented[c, 7 + 3 * k], oriented[c, 8 + 3 * k]
-            reach = oriented[c, 3 + k] + slack
+            reach = oriented[c, 3 + k] + slack  # half of what both boxes take up along this side of box c
             for j in range(3):
                 along = u * oriented[d, 6 + 3 * j] + v * oriented[d, 7 + 3 * j] + w * oriented[d, 8 + 3 * j]
                 reach += abs(along) * oriented[d, 3 + j]

@@ -65,6 +65,7 @@ def triangulate_faces(
     filled = 0
     for f in range(m):
         begin, n, rim = starts[f], starts[f + 1] - starts[f], corners[f, 2]
+        # in the plane: the boundary, the points inside, the segments, and then Delaunay edges
         x = _flattened(points, members[begin : begin + n], corners[f])
         size = _size(x)
         mesh = _rim(x, corners[f], FLAT_HEIGHT * size, FLAT_HEIGHT * size)
@@ -73,6 +74,7 @@ def triangulate_faces(
         for s in range(segment_starts[f], segment_starts[f + 1]):
             _connect(mesh, segments[s, 0], np.zeros(1), segments[s, 0], segments[s, 1], [0])
         _improve(mesh)
+        # back to ids of points, and to numbers of triangles of all faces
         last, tri, adj, fixed = mesh.room[1], mesh.tri, mesh.adj, mesh.fixed
         for t in range(last):
             for k in range(3):

@@ -329,6 +329,7 @@ def _same_rows(rows: Ints) -> Ints:
     table = np.full(size, -1, dtype=np.int32)
     result = np.empty(count, dtype=np.int64)
     for i in range(count):
+        # hash the row, and look from there on for an equal row, or for an empty slot
         key = np.uint64(1469598103934665603)
         for d in range(width):
             key = (key ^ np.uint64(rows[i, d])) * np.uint64(0x9E3779B97F4A7C15)

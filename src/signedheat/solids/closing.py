@@ -89,7 +89,7 @@ def samples_near(triangles: Floats, tree: BoxTree, patches: Ints, rim: PointTree
         parts.append(triangles[chosen])
         labels.append(patches[chosen])
         a, b, c = triangles[~fine].transpose(1, 0, 2)
-        d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2
+        d, e, f = (a + b) / 2, (b + c) / 2, (c + a) / 2  # middles of the sides
         triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, d, f), (d, b, e), (f, e, c), (d, e, f))])
         patches = np.tile(patches[~fine], 4)
     pieces = np.concatenate(parts)

@@ -542,14 +542,14 @@ def _potentials(walk: Walk, vectors: Floats, sums_below: Floats, rows: Ints) -> 
             x[k], y[k], z[k], sums[k] = points[p, 0], points[p, 1], points[p, 2], 0.0
         group = rows[begin] // together
         for node in nodes[starts[group] : starts[group + 1]]:
-            if node > 0:
+            if node > 0:  # all that is below it, at its middle
                 ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
                 vx, vy, vz = sums_below[node, 0], sums_below[node, 1], sums_below[node, 2]
                 for k in range(together):
                     dx, dy, dz = ax - x[k], ay - y[k], az - z[k]
                     square = dx * dx + dy * dy + dz * dz
                     sums[k] += (dx * vx + dy * vy + dz * vz) / (square * np.sqrt(square))
-            else:
+            else:  # the items of a leaf, one by one
                 for item in range((-node - leaves) * BOXES_PER_LEAF, (-node - leaves + 1) * BOXES_PER_LEAF):
                     e = items[item]
                     if e < 0:
@@ -584,7 +584,7 @@ def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floa
             fx[k], fy[k], fz[k] = 0.0, 0.0, 0.0
         group = rows[begin] // together
         for node in nodes[starts[group] : starts[group + 1]]:
-            if node > 0:
+            if node > 0:  # all that is below it, at its middle
                 ax, ay, az = balls[node, 0], balls[node, 1], balls[node, 2]
                 # the field c d / r³ of a charge, and 3 (d · m) d / r⁵ − m / r³ of a dipole moment
                 charge, mx = sums_below[node, 0], sums_below[node, 1]
@@ -597,7 +597,7 @@ def _fields(walk: Walk, charges: Floats, sums_below: Floats, rows: Ints) -> Floa
                     fx[k] += straight * dx - mx * cube
                     fy[k] += straight * dy - my * cube
                     fz[k] += straight * dz - mz * cube
-            else:
+            else:  # the items of a leaf, one by one
                 for item in range((-node - leaves) * BOXES_PER_LEAF, (-node - leaves + 1) * BOXES_PER_LEAF):
                     e = items[item]
                     if e < 0:

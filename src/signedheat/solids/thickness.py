@@ -369,7 +369,8 @@ def _descend(
     of the normals below its nodes. Points nearer than `coincident` to a face coincide with it.
 
     In the first round walls may reach in by `ROUND_WALL`, since a ball that fits a round wall touches all of it. In
-    each further round, near the point that the ball touches, they may do so by `FINER` times as much.
+    each further round, near the point that the ball touches, they may do so by `FINER` times as much. In the body, m is
+    the centre of a ball, t the point that it touches so far, and q that which a smaller one touches.
     """
     leaves, stack = len(bounds) // 2, np.empty(66, dtype=np.int64)
     for p in range(len(points)):
