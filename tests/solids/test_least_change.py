@@ -126,6 +126,9 @@ def test_bodies_far_apart_do_not_know_of_each_other(distance):
     assert solid.distance([[0.0, 0, 0]])[0] == pytest.approx(sh.complete(first).distance([[0.0, 0, 0]])[0], rel=1e-9)
     near = sh.complete(first)
     assert len(solid.triangles) == len(first[1]) + len(second[1]) and near.volume == pytest.approx(own)
+    corners = second[0][second[1]] - [distance, 0, 0]  # as rounded there
+    rounded = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    assert solid.volume == pytest.approx(own + rounded, rel=1e-9)
 
 
 BESIDE = {

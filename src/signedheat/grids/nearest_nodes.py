@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
-from ..mesh.box_tree import BOXES_PER_LEAF, morton_codes
+from ..mesh.box_tree import BOXES_PER_LEAF, order_along_curve
 from ..search.face_tree import FaceTree
 from ..search.nearest_triangles import away_from_triangle, foot_on_triangle
 from .blocks import BLOCK
@@ -49,7 +49,7 @@ def nearest_at_nodes(tree: FaceTree, lattice: Lattice, first: Ints, blocks: Ints
     shape = tuple(np.minimum((blocks.max(axis=0) + 1) * BLOCK, limits) - first)
     squares, faces = np.full(shape, np.nan), np.full(shape, -1, dtype=np.int32)
     boxes = tree.features.rows, tree.tree.bounds, tree.discs, tree.tree.items
-    firsts = BLOCK * blocks[np.argsort(morton_codes(blocks.astype(np.float64)), kind="stable")]
+    firsts = BLOCK * blocks[order_along_curve(blocks.astype(np.float64))]
     last = np.minimum(firsts + BLOCK, limits) - 1
     near, _ = tree.nearest(origin + 0.5 * (firsts + last) * steps)
     crowded = _fill(*boxes, *lattice, firsts, near, first, EIGHTHS, squares, faces)

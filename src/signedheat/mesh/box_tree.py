@@ -33,7 +33,7 @@ class BoxTree(NamedTuple):
     @classmethod
     def of(cls, lower: Floats, upper: Floats) -> BoxTree:
         """Build the tree over boxes given by (n, 3) lower and (n, 3) upper corners, in O(n log n) time."""
-        return cls.in_order(lower, upper, np.argsort(morton_codes((lower + upper) / 2), kind="stable"))
+        return cls.in_order(lower, upper, order_along_curve((lower + upper) / 2))
 
     @classmethod
     def around(cls, corners: Floats) -> BoxTree:
@@ -163,17 +163,47 @@ def order_in_space(points: Floats) -> Ints:
     """Return (n,) indices that sort (n, 3) points along a space-filling curve; fewer than 64 keep their order."""
     if len(points) < 64:  # sorting them would take as long as searching for some
         return np.arange(len(points))
-    return np.argsort(morton_codes(points), kind="stable")
+    return order_along_curve(points)
+
+
+def order_along_curve(points: Floats, groups: Ints | None = None) -> Ints:
+    """Return (n,) indices that sort (n, 3) points along a space-filling curve, group by group of (n,) `groups`.
+
+    Each group has a curve of its own, and so have points of which more than a leaf holds are at one place of a curve,
+    because others are far away.
+    """
+    if groups is None:
+        order, starts = np.arange(len(points)), np.zeros(min(len(points), 1), dtype=np.int64)
+    else:
+        order = np.argsort(groups, kind="stable")
+        starts = np.flatnonzero(np.diff(groups[order], prepend=-1))
+    rows = np.arange(len(points))  # places in the order whose points are still to be sorted, run by run from `starts`
+    while len(rows):
+        sizes = np.diff(starts, append=len(rows))
+        runs, unsorted = np.repeat(np.arange(len(starts)), sizes), points[order[rows]]
+        lower, upper = (extreme.reduceat(unsorted, starts) for extreme in (np.minimum, np.maximum))
+        extents = (upper - lower).max(axis=1)
+        codes = morton_codes(unsorted - lower[runs], extents[runs])
+        by_code = np.lexsort((codes, runs)) if len(starts) > 1 else np.argsort(codes, kind="stable")
+        order[rows], codes = order[rows[by_code]], codes[by_code]
+        begins = np.flatnonzero(np.append(True, (codes[1:] != codes[:-1]) | (runs[1:] != runs[:-1])))
+        counts = np.diff(begins, append=len(rows))
+        crowded = (counts > BOXES_PER_LEAF) & (extents[runs[begins]] > 0)
+        rows, counts = rows[np.repeat(crowded, counts)], counts[crowded]
+        starts = np.cumsum(counts) - counts
+    return order
 
 
 @np.errstate(all="ignore")
-def morton_codes(points: Floats) -> NDArray[np.uint64]:
-    """Return Morton codes of (n, 3) points: positions along a space-filling curve, with 21 bits per axis."""
-    lower = points.min(axis=0)
-    extent = max(float((points.max(axis=0) - lower).max()), 1e-290)
+def morton_codes(points: Floats, extents: Floats | float) -> NDArray[np.uint64]:
+    """Return Morton codes of (n, 3) points: places along a space-filling curve, with 21 bits per axis.
+
+    Coordinates are from 0 to `extents`, a number or one for each point, (n,).
+    """
+    scales = (2**21 - 1) / np.maximum(extents, 1e-290)
     codes = np.zeros(len(points), dtype=np.uint64)
     for axis in range(3):
-        x = ((points[:, axis] - lower[axis]) * ((2**21 - 1) / extent)).astype(np.uint64)
+        x = (points[:, axis] * scales).astype(np.uint64)
         for shift, mask in SPREAD_BITS:
             x |= x << np.uint64(shift)
             x &= np.uint64(mask)

@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..parallel import ROWS_PER_TASK, in_threads
-from .box_tree import boxes_around, morton_codes
+from .box_tree import boxes_around, order_along_curve
 from .edges import has_three_corners
 from .oriented_boxes import TRIANGLES_PER_LEAF, OrientedBoxes, boxes_apart, oriented_apart
 from .unit_vectors import unit
@@ -61,7 +61,7 @@ def overlapping_faces(vertices: Floats, faces: Ints, slacks: Floats, asked: Bool
     fans = np.flatnonzero(hubs >= 0)
     if len(fans):
         arcs = _arcs(vertices, ids[fans], hubs[fans])
-        around = np.argsort(morton_codes(arcs.mean(axis=1)), kind="stable")
+        around = order_along_curve(arcs.mean(axis=1))
         fans, arcs, angles = fans[around], arcs[around].reshape(-1, 9), np.full(len(fans), ARC_ROUNDING)
         triangles = Triangles(corners[fans], ids[fans], slacks[fans])
         tree = OrientedBoxes.of(arcs, angles, hubs[fans], asked[fans])
@@ -114,9 +114,12 @@ def _order(corners: Floats, vertices: Floats, hubs: Ints) -> Ints:
     lower, upper = boxes_around(corners)
     middles = 0.5 * (lower + upper)
     if not (hubs >= 0).any():
-        return np.argsort(morton_codes(middles), kind="stable")
-    positions = np.where((hubs >= 0)[:, None], vertices[hubs], middles)
-    return np.lexsort((morton_codes(middles), hubs, morton_codes(positions)))
+        return order_along_curve(middles)
+    groups = np.unique(np.where(hubs >= 0, hubs, len(vertices) + np.arange(len(hubs))), return_inverse=True)[1]
+    of_groups = np.argsort(order_along_curve(np.where((hubs >= 0)[:, None], vertices[hubs], middles)))
+    first = np.full(len(hubs), len(hubs))
+    np.minimum.at(first, groups, of_groups)
+    return order_along_curve(middles, first[groups])
 
 
 def _arcs(vertices: Floats, faces: Ints, hubs: Ints) -> Floats:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, read_only
 from ..compiled import compiled
 from ..errors import SourceError
-from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, morton_codes
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, boxes_around, order_along_curve
 from ..mesh.components import by_first_use, connected_components, sums_of
 from ..mesh.edges import EdgeTable, edge_table, has_three_corners
 from ..mesh.unit_vectors import unit
@@ -82,7 +82,7 @@ class FaceFeatures(NamedTuple):
             faces, trusted, ids = faces[proper], trusted[proper], ids[proper]
         if len(faces):  # faces near each other in space should be so in memory
             middles = reduce(np.add, vertices.take(faces, axis=0).swapaxes(0, 1))  # three times as far from the origin
-            order = np.argsort(morton_codes(middles), kind="stable")
+            order = order_along_curve(middles)
             trusted, ids = trusted[order], ids[order]
             numbers, used = by_first_use(faces[order].ravel(), len(vertices))
             faces, vertices = numbers.reshape(-1, 3), vertices[used]

@@ -28,7 +28,7 @@ from scipy import sparse
 from ..arrays import Bools, Floats, Frozen, Ints
 from ..compiled import compiled
 from ..linear.conjugate_gradients import conjugate_gradients
-from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, morton_codes
+from ..mesh.box_tree import BOXES_PER_LEAF, BoxTree, order_along_curve
 from ..mesh.components import first_members, numbered, sums_of
 from ..mesh.triangles import area_vectors, face_areas, halved, side_lengths
 from ..mesh.unit_vectors import ANGLE_ROUNDING, unit
@@ -239,7 +239,7 @@ def _faces_drawn(pieces: Pieces, numbers: Ints) -> Ints:
     The faces of a piece follow each other along a space-filling curve, each over a length that is its area. The points
     are at equal distances on this line.
     """
-    order = np.lexsort((morton_codes(pieces.triangles.mean(axis=1)), pieces.labels))
+    order = order_along_curve(pieces.triangles.mean(axis=1), pieces.labels)
     owners, number = numbered(numbers)
     share = (number + 0.5) / numbers[owners]  # of the area of the piece that comes before the point
     ends = np.cumsum(pieces.face_areas[order])

@@ -20,7 +20,7 @@ from ..grids.band import Band
 from ..grids.grid import RESOLUTION, Grid
 from ..jobs import Progress, bound_progress
 from ..mesh.box_tree import order_in_space
-from ..mesh.triangles import area_vectors, face_areas
+from ..mesh.triangles import face_areas, part_volumes
 from ..mesh.welding import indexed
 from ..packages import lazy_module
 from ..parallel import in_chunks
@@ -165,8 +165,7 @@ class Solid(Displayed, Represented, Frozen):
         >>> round(ball.volume, 2), round(ball.area, 2)
         (4.19, 12.56)
         """
-        corners = self.outward - self.bounds.mean(axis=0)
-        return float(np.einsum("ij,ij->", corners[:, 0], area_vectors(corners)) / 3)
+        return float(part_volumes(*indexed(self.outward))[1].sum()) if self.bounding.any() else 0.0
 
     @property
     def area(self) -> float:
