@@ -262,6 +262,14 @@ def test_stray_points_are_left_out_and_told(share):
     assert not sh.complete(sh.PointCloud(points)).diagnostics.notes[0].as_dict().get("stray_points")
 
 
+@pytest.mark.parametrize("far", [1e6, 1e10, 1e30])
+def test_stray_points_may_be_anywhere(far):
+    points = ball(3)[0]
+    alone = sh.complete(sh.PointCloud(points))
+    solid = sh.complete(sh.PointCloud(np.concatenate([[[far, 0, -far]], points, [[0, -2 * far, 0]]])))
+    assert solid.volume == alone.volume and "stray points left out: 2" in str(solid.diagnostics.notes[0])
+
+
 @pytest.mark.parametrize("seed", [0, 1, 2, 44])
 @pytest.mark.parametrize("diagonals", [lambda corner: 0, lambda corner: sum(corner) % 2], ids=["alike", "crossed"])
 def test_bricks_that_touch_stay_bricks_when_a_tenth_of_their_triangles_is_flipped(seed, diagonals):

@@ -147,10 +147,15 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def representatives(self) -> Ints:
-        """(n,) id of the first point that coincides with each, within a ten-millionth of the size of the cloud."""
-        lower, upper = self.bounds
-        cell = 1e-7 * max(float((upper - lower).max()), np.finfo(float).tiny)
-        cells = np.rint((self.points - lower) / cell)
+        """(n,) id of the first point that coincides with each, within a ten-millionth of the size of the cloud.
+
+        The size is that of the box around all but the outermost hundredth of the points along each axis, since strays
+        may be anywhere.
+        """
+        lower, upper = np.quantile(self.points, [0.01, 0.99], axis=0)
+        size = float((upper - lower).max()) or float(np.ptp(self.points, axis=0).max())
+        cell = 1e-7 * max(size, np.finfo(float).tiny)
+        cells = np.rint((self.points - lower) / cell).clip(-(2.0**62), 2.0**62)
         return frozen(same_rows(cells.astype(np.int64)))
 
     @cached_property
