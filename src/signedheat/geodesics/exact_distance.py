@@ -550,6 +550,10 @@ def outdoes(w: Floats, old: Floats) -> bool:
     return True
 
 
+NEAREST_FOCUS = 4.0
+"""Windows are not merged if their wave contracts to a focus nearer than this, in lengths of the edge."""
+
+
 @compiled
 def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
     """Merge window b into a, in place, if they are neighbours and one wave approximates both; return whether it does.
@@ -579,12 +583,12 @@ def merge(a: Floats, b: Floats, length: float, tolerance: float) -> bool:
         merged[SIGMA] = begin - s0 * x / norm
     else:
         to_centre = (s1 - s0) * by / turn  # along the ray, so that it is negative if the centre is a source
-        if 0.0 < to_centre < 4.0 * length:
+        if 0.0 < to_centre < NEAREST_FOCUS * length:
             return False
         merged[P], merged[Q] = s0 + to_centre * ax, to_centre * ay
         merged[KIND] = POINT if to_centre < 0.0 else FOCUS
         merged[SIGMA] = begin + to_centre
-    # errors are 0 at the beginning; half of the largest is taken off all distances
+    # errors are 0 at the beginning; the middle of their range is taken off all distances
     error, end_error = arrival(merged, between, 0.0) - middle, arrival(merged, s1, 0.0) - end
     if max(abs(error), abs(end_error)) > tolerance * length:
         return False

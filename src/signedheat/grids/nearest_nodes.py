@@ -245,7 +245,7 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
     are measured, the half widths and q. The faces of the node lie in the disc ``discs[node]``: centre, unit normal,
     radius and half thickness, which is negative without a disc.
     """
-    total, scale = 0.0, 0.0
+    total, q_square = 0.0, 0.0
     for d in range(3):
         low, high = bounds[node, d] - box[d], bounds[node, 3 + d] - box[d]
         q, e = box[6 + d] - box[d], box[3 + d]
@@ -257,8 +257,8 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
             y = max(min(-e, high, q), low)
             least = min(least, y * y - 2.0 * e * (q - y))
         total += least - q * q
-        scale += q * q
-    if total >= SQUARE_ROUNDING * scale:
+        q_square += q * q
+    if total >= SQUARE_ROUNDING * q_square:
         return False
     thick = discs[node, 7]
     if thick < 0.0:
@@ -268,12 +268,12 @@ def _can_be_nearest(bounds: Floats, discs: Floats, node: int, box: Floats) -> bo
     along = x * nx + y * ny + z * nz
     x, y, z = x - along * nx, y - along * ny, z - along * nz
     from_axis = np.sqrt(x * x + y * y + z * z)
-    # the vector from the nearest place of the disc to the centre of the box. The squared distance to the disc lies
-    # above its tangent plane there
+    # the vector v from the nearest place of the disc to the centre of the box. With w, that from q, nothing in the disc
+    # is as near as q to any x if |v|² − 2 Σ e |v − w| exceeds |w|² + Σ e², as in `_divide`
     outside = max(1.0 - discs[node, 6] / from_axis, 0.0) if from_axis > 0.0 else 0.0
     above = along - min(max(along, -thick), thick)
     x, y, z = outside * x + above * nx, outside * y + above * ny, outside * z + above * nz
-    low = x * x + y * y + z * z - scale * (1.0 + SQUARE_ROUNDING)
+    low = x * x + y * y + z * z - q_square * (1.0 + SQUARE_ROUNDING)
     for d in range(3):
         away = x if d == 0 else y if d == 1 else z
         low -= 2.0 * box[3 + d] * abs(away - box[d] + box[6 + d]) + box[3 + d] * box[3 + d]

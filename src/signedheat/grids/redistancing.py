@@ -138,7 +138,7 @@ def _(grid: Grid, field: Field[Grid], source: object, method: Method | None) -> 
             remedy="fill them in, or use it as it is",
             element="field",
         )
-    run = partial(distance_to_nearest, grid, field.values, None, None, 0.0)
+    run = partial(distance_to_nearest, grid, field.values, source=None, given=None, tolerance=0.0)
     values, diagnostics = timed(run, field.diagnostics)
     return Field(grid, values, diagnostics)
 

@@ -48,10 +48,11 @@ def meshes_of(path: PathLike) -> list[tuple[Path, Scale]]:
 
 
 def _path_of_mesh(robot: Path, name: str) -> Path:
-    """Return the path of a mesh that the description of a robot names.
+    """Return the path of a mesh that the description of a robot, a file, names by a path or a URL.
 
-    ``package://name/rest`` is looked for, with and without `name`, in the folder of the description and in all folders
-    that contain it. If there is no such file, it is a path relative to the folder of the description.
+    After ``file://`` comes the path itself. ``package://name/rest`` is looked for, with and without `name`, in the
+    folder of the description and in all folders that contain it. If there is no such file, it is a path relative to the
+    folder of the description.
     """
     scheme, separator, rest = name.partition("://")
     if scheme == "file" and separator:
@@ -60,7 +61,9 @@ def _path_of_mesh(robot: Path, name: str) -> Path:
     if Path(inner).is_absolute():
         return Path(inner)
     parts = Path(inner).parts
-    names = [inner] if not separator else [inner, os.path.join(*parts[1:])] if len(parts) > 1 else [inner]
+    names = [inner]
+    if separator and len(parts) > 1:
+        names.append(os.path.join(*parts[1:]))
     folders = [robot.absolute().parent, *(robot.absolute().parents if separator else ())]
     paths = [folder / relative for folder in folders for relative in names]
     return next((path for path in paths if path.is_file()), paths[0])

@@ -616,7 +616,7 @@ def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: in
             return a if _cross(mesh, t, k, a, b) else -1
         u = tri[t, k]
         s = adj[t, k]
-        j = (_place(tri, s, u) + 2) % 3
+        j = (_place(tri, s, u) + 2) % 3  # edge j of triangle s is edge k of t the other way, and z is opposite
         z = tri[s, (j + 2) % 3]
         turn = _turn(x, a, b, z)
         if z == b or _meets(mesh, begin, done, b, z):
@@ -625,13 +625,13 @@ def _clear(mesh: Planar, t: int, k: int, begin: int, done: Floats, a: int, b: in
         tails.append(tri[t, k])
         heads.append(tri[t, (k + 1) % 3])
     # flip them in turn; those that cannot be flipped yet, and new ones that cross the segment, queue up again
-    begin, left = 0, FLIP_TRIES * (len(tails) + 4)
-    while begin < len(tails):
+    at, left = 0, FLIP_TRIES * (len(tails) + 4)
+    while at < len(tails):
         left -= 1
         if left < 0:
             return -1
-        u, w = tails[begin], heads[begin]
-        begin += 1
+        u, w = tails[at], heads[at]
+        at += 1
         edge = _edge(mesh, u, w)
         t, k = edge // 3, edge % 3
         c = tri[t, (k + 2) % 3]

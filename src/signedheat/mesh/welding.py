@@ -156,9 +156,10 @@ def _is_single(points: Floats) -> bool:
 
 
 def _rounding(points: Floats, parts: Ints, n: int, digits: int) -> Floats:
-    """Return (n, 3) the last place of the largest coordinate of each of n parts; 0 along axes where no part uses it.
+    """Return (n, 3) the rounding of the coordinates of n parts: half to one last place of the largest.
 
-    `parts` are the part of each point, and coordinates have numbers of `digits` binary digits.
+    It is 0 along axes where no coordinate uses its last place, as on a lattice, since these are exact. `parts` are the
+    part of each point, and coordinates have `digits` binary digits.
     """
     result = np.zeros((n, 3))
     for axis, coordinates in enumerate(points.T):
@@ -166,7 +167,7 @@ def _rounding(points: Floats, parts: Ints, n: int, digits: int) -> Floats:
         np.maximum.at(largest, parts, np.abs(coordinates))
         last_places = np.ldexp(1.0, np.frexp(largest)[1] - digits)
         if (np.fmod(coordinates, 2.0 * last_places[parts]) != 0).any():
-            result[:, axis] = largest * 2.0**-digits
+            result[:, axis] = largest * 2.0**-digits  # which does not jump at powers of two, as last places do
     return result
 
 

@@ -233,7 +233,7 @@ def nearest_faces(
     """Return (n,) the nearest triangle of each of (n, 3) points, and (n,) the squares of their distances.
 
     `discs` are those of `FaceTree.discs`. The search for a point starts with the triangle of the point before, except
-    after every `run` points.
+    after every `run` points, so that it does not matter how points are divided among threads.
     """
     return _descend(rows, tree, discs, read_only(points), run, np.empty(min(max(len(points), 1), POINTS_TOGETHER)))
 
@@ -323,7 +323,7 @@ def _descend(
             if node > 0:
                 first, end = (node - leaves) * BOXES_PER_LEAF, (node - leaves + 1) * BOXES_PER_LEAF
             elif not begun:
-                end = np.int64(1)
+                end = np.int64(1)  # a single item stands for the face found last
             for item in range(first, end):
                 f = items[item] if begun else last
                 if f < 0:

@@ -240,8 +240,8 @@ class SheetWall:
     def _beyond(self, points: Floats, nearest_points: NearestFaces) -> Floats:
         """(n,) distances of (n, 3) points beyond the rim, negative over the surface, given their nearest points.
 
-        If the nearest point is on the rim, it is the height above the plane that stands on the rim there. Otherwise it
-        is the distance of the nearest point from the rim.
+        If the nearest point is on the rim, it is the height above the plane that stands on the rim there, at a corner
+        the higher of two. Otherwise it is the distance of the nearest point from the rim.
         """
         # features are 0 within a face, 1 to 3 on its sides, and 4 to 6 at its corners
         faces, features = nearest_points.faces, nearest_points.features
@@ -254,7 +254,7 @@ class SheetWall:
         begin, end = self.corners[rim_sides[on_side, 0]].swapaxes(0, 1)
         from_begin = np.linalg.norm(nearest_points.places[on_side] - begin, axis=1)
         shares[on_side] = (from_begin / np.linalg.norm(end - begin, axis=1))[:, None]
-        outward = self.outward[rim_sides]
+        outward = self.outward[rim_sides]  # 0 in the last row, which −1 names
         outward = outward[:, :, 0] + shares[..., None] * (outward[:, :, 1] - outward[:, :, 0])
         beyond = np.einsum("nki,ni->nk", outward, points - nearest_points.places).max(axis=1)
         over = np.flatnonzero((rim_sides < 0).all(axis=1))  # points over the surface

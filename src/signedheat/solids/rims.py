@@ -109,8 +109,9 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
     """Divide n directed edges into loops that pass each vertex once.
 
     Return the edges loop by loop, and the end of each loop in this list. `tails` are the vertices that edges begin at,
-    and `following` the next edge of each. Walks begin at edges in the order `order`. Whenever a walk comes to a vertex
-    that it has passed, the edges since then are a loop, and are taken out of the walk.
+    and `following` the next edge of each, a permutation, so that walks end where they began. They begin at edges in the
+    order `order`. Whenever a walk comes to a vertex that it has passed, the edges since then are a loop, and are taken
+    out of the walk.
     """
     n = len(tails)
     index_in_walk, walk, passed = np.full(n_vertices, -1), np.empty(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
@@ -118,7 +119,7 @@ def _simple_loops(tails: Ints, following: Ints, order: Ints, n_vertices: int) ->
     for first in order:
         edge, depth = first, 0
         while True:
-            begin = index_in_walk[tails[edge]] if depth else -1
+            begin = index_in_walk[tails[edge]]
             if begin >= 0:  # the walk from there on is a loop
                 for k in range(begin, depth):
                     edges[count] = walk[k]

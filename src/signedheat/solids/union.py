@@ -127,9 +127,10 @@ def _windings_of(triangles: Floats, given: Windings) -> Windings:
 
 
 def _connected(whole: TriangleGroup) -> tuple[Floats, Ints]:
-    """Return (n, 3) points, one for each corner id of a group, and its (m, 3) faces.
+    """Return (n, 3) points, one for each corner id of joined surfaces, from 0 to n − 1, and their (m, 3) faces.
 
-    Faces use the first of the points at each position, so that faces that touch share vertices.
+    Added vertices have other ids than given ones at the same position. So faces use the first of the points at each
+    position, and share vertices where they touch.
     """
     points = whole.triangles.reshape(-1, 3)[first_members(whole.ids.ravel(), int(whole.ids.max()) + 1)]
     return points, same_positions(points)[whole.ids]
