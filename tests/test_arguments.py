@@ -393,3 +393,10 @@ def test_commands_in_a_working_folder_that_was_deleted(tmp_path, line, monkeypat
     assert main([word.replace("KEPT", str(tmp_path)) for word in line.split()]) == 1
     said = capfd.readouterr().err
     assert "deleted" in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize("option", [{"lids": "".join(["be", "nt"])}, {"nested": "".join(["gi", "ven"])}])
+def test_options_that_are_given_as_their_defaults_are_accepted_where_they_do_not_apply(option):
+    assert sh.signed_distance(LINE, PLANE, **option).values.shape == PLANE.shape
+    with refused(UnsupportedTypeError, element=next(iter(option))):
+        sh.signed_distance(LINE, PLANE, **dict.fromkeys(option, "flat"))

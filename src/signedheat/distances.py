@@ -251,11 +251,11 @@ def signed_distance(
     >>> sh.signed_distance(square, resolution=33)([[0.5, 0.75]]).round(2).tolist()
     [-0.25]
     """
-    given = locals()
-    options = {name: given[name] for name, default in DEFAULTS.items() if given[name] is not default}
+    given = locals()  # before there are any others
+    options = {name: given[name] for name, default in DEFAULTS.items() if not is_default(given[name], default)}
     domain = cast("Domain | None", converted(domain))
     measure = _measure(source, domain)
-    if isinstance(completion, str) and completion == "none":  # arrays compare element by element
+    if isinstance(completion, str) and completion == "none":
         if measure is distance_to_lines:
             measure = unsigned_distance_to_lines
         elif measure is distance_to_curves:
@@ -282,6 +282,11 @@ DEFAULTS = {
 }
 """Options of `signed_distance` with their defaults. An option that differs from its default is refused if it does not
 apply to the kind of source."""
+
+
+def is_default(value: object, default: object) -> bool:
+    """Whether an option was left out, or given as its default is; arrays, which compare by element, were not."""
+    return value is default or (type(value) is type(default) and isinstance(value, str | float) and value == default)
 
 
 def distance_to_solid(

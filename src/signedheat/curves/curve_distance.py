@@ -332,20 +332,23 @@ def distance_to_curves(
         by = triangulated_once(by, flat)
         segments = surface_of(by).segments(flat)  # refuses curves that do not fit
         pieces = None
-        if not as_oriented:
+        if not as_oriented:  # directions do not depend on the options
             pieces = CurvePieces.of(surface_of(by), flat) if is_default else pieces_for_all(solver.domain, flat)
+        # without heat, where the curves as given decide the sides of all vertices
         if pieces is None or bound_as_given(pieces):
             exact = distance_by_sides(by, given)
             if exact is not None:
                 return exact, None, ""
         if as_oriented and left_out is not None:  # warnings call curves by their numbers among those given
             return completed(by, given, pieces)
+        # by heat on the part of the mesh around the curves, if it decides the sides of the rest
         near = Surroundings.of(by.domain, list(chain(*segments))) if is_default and on_its_triangles(by) else None
         if near is not None:
             field, curves, doubt = completed(replace(by, domain=near.part), near.on_part(listed), None)
             extended = near.extended(field)
             if extended is not None:
                 return extended, near.on_whole(curves), doubt
+        # by heat on the whole surface
         return completed(by, listed, pieces)
 
     with part_of_work(0.0, 0.7):

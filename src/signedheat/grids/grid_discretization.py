@@ -330,7 +330,11 @@ def deviation(values: Floats, source: GridSource, levels: Levels) -> Floats:
 
 
 def diffused_mean(source: GridSource, values: Floats) -> NDArray[np.float32]:
-    """Return at each node the mean of (s,) values at samples, weighted by area and heat; the finest grid is skipped."""
+    """Return at each node the mean of (s,) values at samples, weighted by area and by how much heat comes from each.
+
+    Heat and heat times value diffuse alike, as two components, and their quotient is the mean. It varies slowly, so
+    that the finest grid is skipped. Both are scaled to at most 1, for single precision.
+    """
     largest = np.abs(values).max()
     if largest == 0.0:
         return np.zeros(source.grid.shape, dtype=np.float32)

@@ -317,7 +317,11 @@ def unit_vectors(
 def quotients(
     vectors: NDArray[np.float32], inside: Bools, out: NDArray[np.float32], axis: int, start: int, stop: int
 ) -> None:
-    """Write second components of vectors over the first to a slab of `out`; it keeps its values at underflow."""
+    """Write weighted means, second components (weight · value) over first ones (weight), to ``out[0]`` in a slab.
+
+    Where the weight has underflowed, `out`, (1, a, b, c, n), keeps its values. The arguments are those of
+    `unit_vectors`.
+    """
     window = slab(axis, start, stop)
     first, second = vectors[window][..., 0], vectors[window][..., 1]
     known = _nodes_of(inside[window], first.shape[3]) & (first > LEAST_KNOWN)

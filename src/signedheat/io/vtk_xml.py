@@ -134,7 +134,10 @@ def read_vti(path: PathLike, other: str = "") -> tuple[NDArray[Any], Floats, Flo
 
 
 def write_vtp(shape: Elements, path: PathLike) -> bytes:
-    """Return a ``.vtp`` file of polygons, or of points with normals and areas. ParaView shows the first of `values`."""
+    """Return a ``.vtp`` file of polygons, or of points with normals and areas. ParaView shows the first of `values`.
+
+    All writers of shapes take a `path`, which text formats name in their messages; this one does not need it.
+    """
     points, corners, counts = shape.points, shape.corners, shape.counts
     given = {"Normals": shape.normals, "area": shape.areas, **shape.values}
     group = "Polys" if len(counts) else "Verts"

@@ -356,14 +356,15 @@ def _split(records: Records, starts: Ints, along: Ints, n: int) -> tuple[Ints, I
 
     `starts` and `along` are those of `_points_along`, on n points.
     """
+    # where in `along` each part has its ends, found by line and point; it may run against its line
     keys = np.repeat(np.arange(len(starts) - 1), np.diff(starts)) * n + along
     order = np.argsort(keys, kind="stable")
-    tails, heads = (
+    one_end, other_end = (
         order[np.searchsorted(keys[order], records.lines * n + end)] for end in (records.tails, records.heads)
     )
-    low, high = np.minimum(tails, heads), np.maximum(tails, heads)
-    row, place = numbered(high - low)
-    place += low[row]
+    first, last = np.minimum(one_end, other_end), np.maximum(one_end, other_end)
+    row, place = numbered(last - first)
+    place += first[row]
     return records.faces[row], along[place], along[place + 1]
 
 

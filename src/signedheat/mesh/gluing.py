@@ -153,9 +153,11 @@ def diamond(g: Gluing, h: int) -> tuple[float, float, float, float, float]:
     """Unfold the two faces at an edge into one plane: that of ``h: i → j`` with apex a, that of its twin with apex b.
 
     Returns the areas of triangles jab, iab, of the twin's face and of the face of h, and the length |ab|. The areas
-    are weights with area_jab·i + area_iab·j = area_twin·a + area_h·b. All are 0 if a face is degenerate.
+    are weights with area_jab·i + area_iab·j = area_twin·a + area_h·b. The first two are signed: one is negative or 0 if
+    the two faces are no strictly convex quadrilateral. All are 0 if a face is degenerate.
     """
     t = g.sibling[h]
+    # the twin runs j → i, or as h does if its face has the opposite orientation; at i and at j, these leave in its face
     mirrored = g.forward[h] == g.forward[t]
     at_i, at_j = (t, following(t)) if mirrored else (following(t), t)
     ai, ja = g.length[g.edge[preceding(h)]], g.length[g.edge[following(h)]]

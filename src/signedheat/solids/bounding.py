@@ -521,9 +521,10 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
 
     `labels` are the pieces of the (k,) faces, `edges` the (r, 2) open edges of pieces, and `owners` their pieces.
     """
+    # nodes are the pieces, and a hub for each part that shared edges connect
     n = int(labels.max()) + 1
     hubs = np.unique(chain.complexes[faces[first_members(labels, n)]], return_inverse=True)[1]
-    several = np.bincount(labels)[owners] > 1
+    several = np.bincount(labels)[owners] > 1  # loose triangles are connected by clusters only
     owners, (left, right) = owners[several], meeting_edges(chain.positions[edges[several]])
     return connected_components(
         n + int(hubs.max()) + 1,
@@ -551,10 +552,12 @@ def clusters_of(pieces: Pieces) -> Ints:
     low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
     np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
     np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
-    radii = 0.5 * np.linalg.norm(high - low, axis=1)
+    sizes = np.linalg.norm(high - low, axis=1)
+    # distances are between centres of triangles that are not slender, and each is compared with the 8 nearest only:
+    # what is farther away is connected through these, as a rule
     parts, faces = elements(pieces)
     owners, points = parts.labels[faces], parts.triangles[faces].mean(axis=1)
     away, near = PointTree(points).query(points, min(9, len(points)))  # itself and 8
     away, others = away.reshape(len(points), -1), owners[near].reshape(len(points), -1)
-    joined = away < 2 * GAP_REACH * np.minimum(radii[owners][:, None], radii[others])
+    joined = away < GAP_REACH * np.minimum(sizes[owners][:, None], sizes[others])
     return connected_components(n, np.repeat(owners, joined.sum(axis=1)), others[joined])

@@ -208,7 +208,7 @@ def without_slender(pieces: Pieces) -> Pieces:
 
 
 def elements(pieces: Pieces) -> tuple[Pieces, Ints]:
-    """Return the pieces without slender triangles, and (n,) all of their triangles, or `MOST_DIPOLES` drawn evenly."""
+    """Return the pieces with slender triangles halved, and (n,) all their triangles, or `MOST_DIPOLES` drawn evenly."""
     pieces = without_slender(pieces)
     n = len(pieces.triangles)
     return pieces, np.arange(n) if n <= MOST_DIPOLES else np.unique(sampled(pieces, MOST_DIPOLES)[0])

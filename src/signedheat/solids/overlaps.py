@@ -114,8 +114,8 @@ class Bodies:
     as_given: Bools  # (b,) which were clearly given as bodies that face outwards
 
     @classmethod
-    def of(cls, pieces: Pieces, directed: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
-        """Find the bodies among oriented pieces, with corners `directed`, (m, 3, 3), and (p,) groups.
+    def of(cls, pieces: Pieces, corners: Floats, groups: Ints, alone: Floats, given: Floats) -> Bodies:
+        """Find the bodies among oriented pieces; `corners` are (m, 3, 3), and `groups` (p,) those that are connected.
 
         `alone` are the (p,) levels of pieces by themselves, `given` the (p,) area that faces as given, less the rest.
         """
@@ -123,10 +123,11 @@ class Bodies:
         n = len(groups)
         by_itself = np.abs(alone) >= SHEET
         names, candidates = np.unique(np.where(by_itself, n + np.arange(n), groups), return_inverse=True)
-        levels = levels_of_pieces(Pieces(directed, candidates[pieces.labels]))
+        levels = levels_of_pieces(Pieces(corners, candidates[pieces.labels]))
         chosen = np.flatnonzero(np.abs(levels) >= SHEET)
         numbers = np.full(len(names), -1)
         numbers[chosen] = np.arange(len(chosen))
+        # area that was given as it must be to face outwards, less the rest
         net = np.bincount(candidates, given)[chosen] * np.sign(levels[chosen])
         return cls(numbers[candidates], levels[chosen], net >= HINT * np.bincount(candidates, pieces.areas)[chosen])
 

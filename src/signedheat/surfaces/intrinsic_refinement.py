@@ -102,7 +102,8 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
     tail, head = gluing.tail[start], gluing.tail[3 * (start // 3) + (start + 1) % 3]
     lengths = gluing.length[:n_edges]
     order = np.argsort(lengths, kind="stable")
-    group, extent = coinciding(tail, head, lengths, order[counts[order] > 0], n_vertices)
+    order = order[counts[order] > 0]  # without edges that flips have left without faces
+    group, extent = coinciding(tail, head, lengths, order, n_vertices)
     segments = np.flatnonzero(gluing.fixed[:n_edges])
     segment = np.full(n_edges, -1, dtype=np.int64)
     segment[segments] = np.arange(len(segments))
@@ -120,8 +121,8 @@ def agenda_of(gluing: Gluing) -> tuple[Ints, Agenda]:
         group=group,
         extent=extent,
         seen=np.array([gluing.counts[N_STEPS], BAD_FACE_LISTS]),
-        seen_sides=np.empty((4096, 2), dtype=np.complex128),
-        halfedges=np.empty((4096, 2), dtype=np.int64),
+        seen_sides=np.empty((MOST_VISITED, 2), dtype=np.complex128),
+        halfedges=np.empty((MOST_VISITED, 2), dtype=np.int64),
     )
 
 
@@ -130,6 +131,8 @@ REFINED, ARRAYS_FULL, LIMIT_REACHED, PAUSED = 0, 1, 2, 3
 so that progress is reported."""
 NARROW_ANGLE = np.pi / 3
 """Where segments meet at less than this angle, or a vertex has less in total, small angles cannot be avoided."""
+MOST_VISITED = 4096
+"""Number of halfedges that `encroached` visits at most, so that slivers do not keep it busy."""
 BAD_FACE_LISTS = 256
 """Number of lists of bad faces, by circumradius: two for each power of two."""
 

@@ -69,8 +69,8 @@ class RepairedMesh:
             return source
         faces = source.faces
         if not ((faces >= 0) & (faces < len(self.faces))).all():
-            return source
-        weights = np.zeros((len(faces), 3))
+            return source  # it is refused later, with its number
+        weights = np.zeros((len(faces), 3))  # added up, since corners that were welded are one
         np.add.at(weights, (np.arange(len(faces))[:, None], self.corners[faces]), source.barycentric)
         if isinstance(source, SurfacePoints):
             return SurfacePoints(self.faces[faces], weights)
