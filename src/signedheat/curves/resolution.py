@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Any, TypeVar
 
 from ..discretization import discretize
-from ..errors import CancellingNormalsError, GeometryError, SourceError
+from ..errors import CancellingNormalsError, FactorizationError, GeometryError, SourceError
 from ..jobs import part_of_work
 from ..shapes.foreign import as_list
 from ..shapes.kinds import SurfaceDomain
@@ -43,7 +43,7 @@ def on_resolving_triangles(
     if isinstance(mesh, TriangleMesh) and (always or are_small(solver, curves)):
         try:
             return measure(for_zero_set(mesh, solver.diffusion))
-        except GeometryError:
+        except (GeometryError, FactorizationError):
             pass
     try:
         return measure(solver)
@@ -67,11 +67,13 @@ def are_small(solver: SignedHeatSolver[Any], curves: CurvesAndPoints) -> bool:
 def triangulated_once(solver: SignedHeatSolver[Surface], curves: Sequence[CurveOrPoints]) -> SignedHeatSolver[Surface]:
     """Return a solver that uses the triangulation for all of the curves for any subset of them, too.
 
-    A solver that does not make a triangulation for every set of sources is returned as it is.
+    A solver that does not make a triangulation for every set of sources is returned as it is. So is one whose triangles
+    had to be divided along unoriented curves, after which other curves cannot be moved to them.
     """
     with part_of_work(0.0, 0.4):
         made = solver.discretization
-        return with_discretization(solver, made.adapt(curves)[0]) if isinstance(made, Retriangulated) else solver
+        surface = made.adapt(curves)[0] if isinstance(made, Retriangulated) else None
+    return solver if surface is None or surface.transfer is None else with_discretization(solver, surface)
 
 
 def surface_of(solver: SignedHeatSolver[Surface]) -> SurfaceDiscretization:
