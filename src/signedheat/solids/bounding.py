@@ -19,6 +19,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of
 from ..mesh.components import connected_components, first_members, sums_of
 from ..mesh.triangles import cone_volumes
+from ..mesh.welding import same_rows
 from ..parallel import PointTree
 from ..search.winding_tree import WindingTree
 from .chain import Chain
@@ -525,7 +526,9 @@ def connected_pieces(chain: Chain, faces: Ints, labels: Ints, edges: Ints, owner
     n = int(labels.max()) + 1
     hubs = np.unique(chain.complexes[faces[first_members(labels, n)]], return_inverse=True)[1]
     several = np.bincount(labels)[owners] > 1  # loose triangles are connected by clusters only
-    owners, (left, right) = owners[several], meeting_edges(chain.positions[edges[several]])
+    # where two pieces share an edge, they are connected already
+    on_rim = several & (np.bincount(same_rows(np.sort(edges, axis=1)), minlength=len(edges)) == 1)
+    owners, (left, right) = owners[on_rim], meeting_edges(chain.positions[edges[on_rim]])
     return connected_components(
         n + int(hubs.max()) + 1,
         *(np.concatenate(ends) for ends in ((np.arange(n), owners[left]), (n + hubs, owners[right]))),
