@@ -48,7 +48,7 @@ from .rims import boundary, divided_at_rims, loops
 from .sealing import sealed
 from .solid import Solid
 from .union import TriangleGroup, solid_as_given, united
-from .winding import Windings
+from .winding import INSIDE_WINDING, Windings
 
 
 def seam_triangles(vertices: Floats, faces: Ints, patches: Ints, step: float) -> tuple[Floats, Ints]:
@@ -448,9 +448,10 @@ def overruled(solid: Solid, lids: Floats) -> float:
     """
     lower, upper = solid.bounds
     points = lower + np.random.default_rng(0).random((EVIDENCE_POINTS, 3)) * (upper - lower)
-    inside = solid.inside(points)
-    windings = solid.windings.numbers(points) - WindingTree.of(lids).numbers(points)
-    return float(np.where(inside, windings < 1 - CLEAR_WINDING, windings > CLEAR_WINDING).mean())
+    numbers = solid.windings.numbers(points)
+    of_faces = numbers - WindingTree.of(lids).numbers(points)
+    contradicts = np.where(numbers > INSIDE_WINDING, of_faces < 1 - CLEAR_WINDING, of_faces > CLEAR_WINDING)
+    return float(contradicts.mean())
 
 
 def _closed_by_lids(vertices: Floats, faces: Ints, origins: Ints, bent: bool) -> tuple[TriangleGroup, list[Note]]:

@@ -29,6 +29,9 @@ from .triangle_mesh import TriangleMesh
 if TYPE_CHECKING:
     import trimesh  # noqa: F401  named in the base class
 
+COINCIDING = 1e-7
+"""Points coincide if they round to the same multiples of this share of the size of the cloud. From 5e-8 to 1e-5 no
+volume of two clouds, each also given twice, 1e-13 or 1e-9 apart, changes by more than 1e-4."""
 CONTRARY_NORMALS = 0.35
 """If a larger share of the given normals, and of their inverses, contradicts the orientation of the points, there is a
 warning. It is 0.39 to 0.49 if both sides of a plate are merged, and 0.3 if 0.3 of the normals are flipped."""
@@ -147,14 +150,13 @@ class PointCloud(Exchangeable["trimesh.PointCloud"], Surface):
 
     @cached_property
     def representatives(self) -> Ints:
-        """(n,) id of the first point that coincides with each, within a ten-millionth of the size of the cloud.
+        """(n,) id of the first point that coincides with each, within `COINCIDING` of the size of the cloud.
 
-        The size is that of the box around all but the outermost hundredth of the points along each axis, since strays
-        may be anywhere.
+        The size is the largest interquartile range of coordinates, since strays may be anywhere.
         """
-        lower, upper = np.quantile(self.points, [0.01, 0.99], axis=0)
+        lower, upper = np.quantile(self.points, [0.25, 0.75], axis=0)
         size = float((upper - lower).max()) or float(np.ptp(self.points, axis=0).max())
-        cell = 1e-7 * max(size, np.finfo(float).tiny)
+        cell = COINCIDING * max(size, np.finfo(float).tiny)
         cells = np.rint((self.points - lower) / cell).clip(-(2.0**62), 2.0**62)
         return frozen(same_rows(cells.astype(np.int64)))
 
