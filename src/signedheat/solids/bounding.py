@@ -149,10 +149,14 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
     nothing is flipped, and the chain is read as given only.
     """
     given = as_given(chain, chain.reversed)
+    if as_oriented or given.whole.all():
+        return _decided(chain, given, ~given.whole & as_oriented, nested, as_oriented)
+    agreeing = _agreeing(chain, given)
+    given = mixed(chain, [given, agreeing], (agreeing.whole & ~given.whole).astype(np.int64))
     whole = given.whole
-    held = ~whole & (as_oriented or nested == "given")  # these are not flipped if they are read as given
-    decided = _decided(chain, given, held, nested, as_oriented)
-    if as_oriented or whole.all():
+    held = ~whole & (nested == "given")  # these are not flipped if they are read as given
+    decided = _decided(chain, given, held, nested)
+    if whole.all():
         return decided
     parts = _Parts.of(chain, given)
     best = parts.judged(decided)
@@ -165,7 +169,7 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
             readings, best = [inside_out], candidate
     # other readings, of which `chosen` is the one that each triangle is read by so far, as an index
     by_once = once(chain)
-    for trial in _trials(chain, parts, given, by_once, best.missing, nested):
+    for trial in _trials(chain, parts, given, agreeing, by_once, best.missing, nested):
         present, improvable = best, trial.parts & (best.missing >= trial.least)
         if not improvable.any() or (trial.overlaps and not overlapping):
             continue
@@ -193,15 +197,18 @@ def bounding(chain: Chain, nested: Nesting = "given", as_oriented: bool = False)
 
 
 def _trials(
-    chain: Chain, parts: _Parts, given: Reading, by_once: Reading, missing: Floats, nested: Nesting
+    chain: Chain,
+    parts: _Parts,
+    given: Reading,
+    agreeing: Reading,
+    by_once: Reading,
+    missing: Floats,
+    nested: Nesting,
 ) -> list[_Trial]:
     """List the readings to try after that as `given`, in order; it leaves the (p,) shares `missing` unexplained.
 
     `by_once` reads each triangle once, and `nested` is how closed pieces within others are asked to face.
     """
-    agreed = chain.agreeing_as_indexed()
-    agreeing = _with_ways(chain, given, chain.reversed != agreed.turned)
-    agreeing = replace(agreeing, disagreeing=agreed.disagreeing)
     outwards = _with_ways(chain, agreeing, chain.outwards_as_indexed(agreeing.reversed))
     # a single piece that agrees can only be turned, which costs `LEAST_GAIN`
     doubtful = (np.bincount(parts.of_pieces) > 1) | (missing > LEAST_GAIN)
@@ -232,6 +239,12 @@ def _with_sheets_agreeing(chain: Chain, decided: Bounding, agreeing: Reading, wh
         orientable=np.concatenate([decided.orientable, agreeing.orientable]),
         disagreeing=agreeing.disagreeing,
     )
+
+
+def _agreeing(chain: Chain, given: Reading) -> Reading:
+    """Read a chain as `given`, but with triangles that share an edge by index oriented consistently."""
+    agreed = chain.agreeing_as_indexed()
+    return replace(_with_ways(chain, given, chain.reversed != agreed.turned), disagreeing=agreed.disagreeing)
 
 
 def _with_ways(chain: Chain, reading: Reading, reversed: Bools) -> Reading:
