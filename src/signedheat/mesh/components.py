@@ -111,6 +111,21 @@ def sums_of(values: NDArray[np.floating], groups: NDArray[np.integer], n: int) -
     return np.asarray(sums.reshape(n, *values.shape[1:]), np.float64)
 
 
+def boxes_of(points: Floats, groups: Ints, n: int) -> tuple[Floats, Floats]:
+    """Return (n, 3) lower and (n, 3) upper corners of the boxes around (k, 3) points in each of n groups.
+
+    Point i is in group groups[i]. Where a group has no point, the lower corner is ∞ and the upper one −∞.
+    """
+    order, counts = np.argsort(groups, kind="stable"), np.bincount(groups, minlength=n)
+    used = counts > 0
+    starts, columns = (np.cumsum(counts) - counts)[used], [column[order] for column in points.T]
+    lower, upper = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
+    if len(points):
+        for corners, extreme in ((lower, np.minimum), (upper, np.maximum)):
+            corners[used] = np.stack([extreme.reduceat(column, starts) for column in columns], axis=1)
+    return lower, upper
+
+
 @compiled
 def _grouped(groups: Ints, n: int) -> tuple[Ints, Ints]:
     """Return the (n + 1,) offsets of groups and the (k,) indices of their members, by a counting sort."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints, mask_of, read_only
 from ..compiled import compiled
-from .components import connected_components
+from .components import boxes_of, connected_components
 from .edges import find_edges, has_three_corners, pair_halfedges
 
 ONE_PLACE = 4.0
@@ -35,16 +35,15 @@ def part_sizes(points: Floats, labels: Ints, tails: Ints, heads: Ints) -> Floats
     has m faces, so that a single face that reaches far beyond all others does not count.
     """
     n = int(labels.max(initial=-1)) + 1
-    low, high, lengths = np.full((3, n), np.inf), np.full((3, n), -np.inf), np.zeros(len(tails))
-    for axis, along in enumerate(points.T.copy()):
-        np.minimum.at(low[axis], labels, along)
-        np.maximum.at(high[axis], labels, along)
+    lengths = np.zeros(len(tails))
+    for along in points.T.copy():
         np.maximum(lengths, np.abs(along[heads] - along[tails]), out=lengths)
     proper = lengths > 0
     owners = labels[tails[proper]]
     counts = np.bincount(owners, minlength=n)
     logs = np.bincount(owners, np.log(lengths[proper]), n) / np.maximum(counts, 1)
-    return np.where(counts > 0, np.minimum((high - low).max(axis=0), np.sqrt(counts / 3.0) * np.exp(logs)), 0.0)
+    low, high = boxes_of(points, labels, n)
+    return np.where(counts > 0, np.minimum((high - low).max(axis=1), np.sqrt(counts / 3.0) * np.exp(logs)), 0.0)
 
 
 def parts_by_place(points: Floats, tails: Ints, heads: Ints) -> tuple[Ints, Floats]:
@@ -55,9 +54,7 @@ def parts_by_place(points: Floats, tails: Ints, heads: Ints) -> tuple[Ints, Floa
     ids = joined_rims(points, tails, heads, ONE_PLACE)
     labels = connected_components(len(points), ids[tails], ids[heads])[ids[tails]]
     names, parts = np.unique(labels, return_inverse=True)
-    low, high = np.full((len(names), 3), np.inf), np.full((len(names), 3), -np.inf)
-    np.minimum.at(low, parts, points[tails])
-    np.maximum.at(high, parts, points[tails])
+    low, high = boxes_of(points[tails], parts, len(names))
     return parts, np.linalg.norm(high - low, axis=1)
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arrays import Bools, Floats, Frozen, Ints, mask_of
-from ..mesh.components import connected_components, first_members, sums_of
+from ..mesh.components import boxes_of, connected_components, first_members, sums_of
 from ..mesh.triangles import cone_volumes
 from ..mesh.welding import same_rows
 from ..parallel import PointTree
@@ -565,9 +565,7 @@ def clusters_of(pieces: Pieces) -> Ints:
     n = len(pieces.areas)
     if n == 1:
         return np.zeros(1, dtype=np.int64)
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    np.minimum.at(low, pieces.labels, pieces.triangles.min(axis=1))
-    np.maximum.at(high, pieces.labels, pieces.triangles.max(axis=1))
+    low, high = boxes_of(pieces.triangles.reshape(-1, 3), np.repeat(pieces.labels, 3), n)
     sizes = np.linalg.norm(high - low, axis=1)
     # distances are between centres of triangles that are not slender, and each is compared with the 8 nearest only:
     # what is farther away is connected through these, as a rule

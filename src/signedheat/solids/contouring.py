@@ -237,10 +237,12 @@ def _vertices(
             (farther_ranks > ranks[creased]) | (farther_ranks == 3) | (np.abs(off[creased]) > ON_LEVEL * step)
         )
         wider[creased[better]] = middles[creased[better]] + farther[better]
-    for _ in range(2):  # steps of Newton's method towards the surface
-        far = np.flatnonzero(np.abs(off) > ON_LEVEL * step)
+    far = np.flatnonzero(np.abs(off) > ON_LEVEL * step)
+    for later_steps in (1, 0):  # of Newton's method towards the surface
         minima[far] = np.clip(minima[far] - off[far, None] * gradients[far], lower[far], upper[far])
-        off[far], gradients[far] = offset.slopes(middles[far] + minima[far])
+        if later_steps:
+            off[far], gradients[far] = offset.slopes(middles[far] + minima[far])
+            far = far[np.abs(off[far]) > ON_LEVEL * step]
     return middles + minima, middles, wider
 
 

@@ -18,7 +18,7 @@ from ..arrays import Bools, Floats, Ints
 from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
 from ..errors import GeometryError, OutsideError, SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
-from ..mesh.components import element_components, first_members
+from ..mesh.components import boxes_of, element_components, first_members
 from ..mesh.edges import edge_table, has_three_corners
 from ..mesh.self_intersections import overlapping_faces
 from ..mesh.triangles import area_vectors, face_areas
@@ -210,9 +210,7 @@ def _confidence(triangles: Floats, owners: Ints, whole: TriangleGroup, points: F
     # trust falls over a share of the size of the given part of the same surface
     surfaces = element_components(whole.ids)
     n = int(surfaces.max()) + 1
-    low, high = np.full((n, 3), np.inf), np.full((n, 3), -np.inf)
-    np.minimum.at(low, surfaces[given], whole.triangles[given].min(axis=1))
-    np.maximum.at(high, surfaces[given], whole.triangles[given].max(axis=1))
+    low, high = boxes_of(whole.triangles[given].reshape(-1, 3), np.repeat(surfaces[given], 3), n)
     alone = ~np.isfinite(low).all(axis=1)  # level sets that replace what was given
     low[alone], high[alone] = corners.min(axis=0), corners.max(axis=0)
     reach = TRUST_DISTANCE * np.linalg.norm(high - low, axis=1)[surfaces[owners[added]]]
