@@ -1,7 +1,8 @@
 """Which triangles of a shape bound a solid, and which way they face.
 
-The shape is read as it was given first. Each connected part that this leaves unexplained is read in other ways, too
-(`readings`). The reading that leaves the least area unexplained is used; as given wins ties.
+The shape is read as it was given first, except for components that are closed as soon as neighbours agree: these are
+read so. Each connected part that this leaves unexplained is read in other ways, too (`readings`). The reading that
+leaves the least area unexplained is used; as given wins ties.
 
 Closed pieces are kept whole, and flipped as a whole to face outwards. Within another body each keeps the orientation
 it was given relative to that body. All other pieces are open. Gauss's formula (`gauss`) decides for all of them
