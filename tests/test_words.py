@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from public_names import PUBLIC, methods
-from signedheat import diagnostics
+from signedheat import Grid, TriangleMesh, complete, diagnostics, samples
+from signedheat.cli import main
 from signedheat.errors import Sentence, counted, percent
 
 
@@ -81,3 +82,20 @@ def test_docstrings_use_the_words_of_the_field(name, docstring):
     text = re.sub(r"``.*?``|`[^`]*`|in place of", "code", prose(docstring), flags=re.S)
     assert re.findall(DIALECT, text) == []
     assert [each for each in sentences(text) if len(re.findall(r"[;:](?=\s|$)", each)) > 1] == []
+
+
+@pytest.mark.parametrize("away", [0.0, 1e2, 5e6, -3e9])
+def test_places_are_told_apart_however_far_they_are(away, tmp_path, capsys):
+    """As in coordinates of maps: a box of size 20 is told to four digits of its size."""
+    ball = samples.sphere(2, radius=10.0)
+    shape = TriangleMesh(ball.vertices + np.array([away, 2.0 * away, 0.0]), ball.faces)
+    shape.save(tmp_path / "far.ply")
+    assert main(["info", str(tmp_path / "far.ply")]) == 0
+    rows = [line.split()[1:] for line in capsys.readouterr().out.splitlines() if line[:5] in ("lower", "upper")]
+    pattern = r"box from \((.*)\) to \((.*)\),"
+    texts = [text.split(", ") for text in re.search(pattern, repr(complete(shape))).groups()]
+    for corners in (rows, texts):
+        assert np.abs(np.array(corners, dtype=float) - shape.bounds).max() <= 20 * 0.5e-3
+    grid = Grid.around(shape.bounds, resolution=9)
+    origin = re.search(r"origin=\[(.*?)\]", repr(grid)).group(1).split(", ")
+    assert np.abs(np.array(origin, dtype=float) - grid.origin).max() <= 28 * 0.5e-3

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Callable, Hashable
 from dataclasses import fields, is_dataclass
 from threading import RLock
 from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int64]
@@ -83,6 +84,23 @@ def short(value: object) -> str:
         inner = ", ".join(short(entry) for entry in value)
         return f"({inner})" if isinstance(value, tuple) else f"[{inner}]"
     return repr(value)
+
+
+def place(point: ArrayLike, bounds: ArrayLike) -> str:
+    """Return the coordinates of a point, (d,), as text, to four digits of the size of what it is part of.
+
+    `bounds` are corners or points, (n, d), between which that lies, near the origin or far from it.
+
+    Examples
+    --------
+    >>> place([500123.25, -0.5, 3.0], [[500120.0, -5.0, 0.0], [500140.0, 5.0, 10.0]])
+    '(500123.25, -0.5, 3)'
+    """
+    coordinates = np.asarray(point, dtype=np.float64).tolist()
+    size = float(np.ptp(np.asarray(bounds, dtype=np.float64), axis=0).max())
+    scale = size if 0.0 < size < np.inf else np.inf
+    digits = [4 + max(0, math.ceil(math.log10(max(abs(x) / scale, 1.0)))) for x in coordinates]
+    return f"({', '.join(f'{x:.{min(n, 17)}g}' for x, n in zip(coordinates, digits, strict=True))})"
 
 
 K = TypeVar("K", bound=Hashable)

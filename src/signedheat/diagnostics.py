@@ -8,7 +8,7 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from .arrays import Frozen, Ints, ShortRepr
+from .arrays import Frozen, Ints, ShortRepr, place
 from .errors import Sentence, percent
 
 SMALL_SHARE = 0.005
@@ -264,7 +264,7 @@ class CompletedArea(Note):
         text = f"{percent(self.completed_share)} of the surface is completed"
         if not len(self.where):
             return text
-        lower, upper = ("(" + ", ".join(f"{x:.4g}" for x in corner) + ")" for corner in self.where[0])
+        lower, upper = (place(corner, self.where[0]) for corner in self.where[0])
         return f"{text}, most of it between {lower} and {upper}"
 
 

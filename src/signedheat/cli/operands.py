@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from argparse import Namespace
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 import signedheat as sh
 
 from ..arrays import Floats
+from ..arrays import place as place
 from ..constraints import Constraint
 from ..diagnostics import Diagnostics, SampledSource
 from ..distances import grid_around, measured_distance
@@ -105,11 +106,6 @@ def unit_suffix(unit: str | None, power: str = "") -> str:
     It is empty if the unit is unknown.
     """
     return "" if unit is None else f" {unit}{power}"
-
-
-def point_in_words(coordinates: Iterable[float]) -> str:
-    """Return the coordinates of a point as text, such as ``"(1, 2.5, 0)"``."""
-    return f"({', '.join(f'{x:.4g}' for x in coordinates)})"
 
 
 def solid_of(arguments: Namespace, path: str) -> Any:

@@ -13,6 +13,7 @@ import numpy as np
 
 import signedheat as sh
 
+from ..arrays import Floats, place
 from ..errors import SourceError, counted, percent, printable
 from ..geodesics.shortest_paths import gaps
 from ..grids.grid_discretization import fitting_spacing, memory_estimate
@@ -70,7 +71,7 @@ def report(file: str, arguments: Namespace) -> Summary:
         summary["units"] = unit
     if extension(file) == ".obj":
         summary["line_elements"] = len(read_obj_elements(file)[1])
-    rows = {name: value for name, value in summary.items() if name != "thickness"}
+    rows = {name: value for name, value in summary.items() if name != "thickness"} | _box_rows(summary)
     if isinstance(counts, SurfaceReport) and counts.small_parts:
         summary["without_small_parts"] = advice = without_small_parts(counts, file)
         rows["small_parts"] = f"{counts.small_parts}, left out by {printable(advice)}"
@@ -78,7 +79,7 @@ def report(file: str, arguments: Namespace) -> Summary:
     if oriented is not None:
         rows["orientation"] = orientation_text(oriented)
     if measured is not None:
-        rows |= _width_rows(measured)
+        rows |= _width_rows(measured, shape.bounds)
     summary["memory_bytes"] = sizes = {str(n): _memory(shape, n) for n in arguments.resolution}
     summary["least_spacing"] = least = _least_spacing(shape)
     rows |= {f"memory at {n}": "–" if size is None else f"{size / 1e9:.2f} GB" for n, size in sizes.items()}
@@ -116,7 +117,7 @@ def lines_report(file: str) -> Summary:
         "lower": bounds[0].tolist(),
         "upper": bounds[1].tolist(),
     }
-    return summary, _table(summary)
+    return summary, _table(summary | _box_rows(summary))
 
 
 def image_report(file: str, image: sh.io.LabelImage) -> dict[str, Any]:
@@ -354,8 +355,14 @@ def _count(number: int, name: str) -> str:
     return f"{number} {name}" if number == 1 else f"{number} {name}s"
 
 
-def _width_rows(widths: Widths) -> dict[str, str]:
-    """Return rows of the table by name, with the widths of walls and gaps and where the thinnest wall is."""
+def _box_rows(summary: dict[str, Any]) -> dict[str, str]:
+    """Return the rows of the table with the two corners of the box around a shape."""
+    bounds = {name: summary[name] for name in ("lower", "upper")}
+    return {name: place(corner, [*bounds.values()])[1:-1].replace(",", "") for name, corner in bounds.items()}
+
+
+def _width_rows(widths: Widths, bounds: Floats) -> dict[str, str]:
+    """Return rows of the table by name: the widths of walls and gaps of a shape, and where its thinnest wall is."""
     rows = {}
     for name, low, typical in (
         ("thin walls (1 %)", widths.wall, widths.typical_wall),
@@ -364,8 +371,7 @@ def _width_rows(widths: Widths) -> dict[str, str]:
         if low is not None:
             rows[name] = f"{low:.4g}" + (f" (typical {typical:.4g})" if typical is not None else "")
     if widths.thinnest is not None and widths.thinnest_place is not None:
-        point = ", ".join(f"{x:.4g}" for x in widths.thinnest_place)
-        rows["thinnest place"] = f"{widths.thinnest:.4g} at ({point})"
+        rows["thinnest place"] = f"{widths.thinnest:.4g} at {place(widths.thinnest_place, bounds)}"
     if widths.spacing is not None:
         rows["spacing they need"] = f"{widths.spacing:.4g}"
     return rows

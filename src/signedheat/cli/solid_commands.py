@@ -376,10 +376,9 @@ def section(arguments: Namespace) -> Summary:
         sections = solid.section(origin, arguments.normal, heights=arguments.heights)
         cut = [(path, part) for path, part in zip(outputs, sections, strict=True) if part.outlines or part.sheets]
         if not cut:
-            low, high = solid.bounds.tolist()
+            low, high = (shapes.place(corner, solid.bounds) for corner in solid.bounds)
             raise sh.errors.OutsideError(
-                f"no plane meets the shape, which reaches from {shapes.point_in_words(low)} "
-                f"to {shapes.point_in_words(high)}",
+                f"no plane meets the shape, which reaches from {low} to {high}",
                 remedy="choose another origin, or other heights",
                 element="--origin",
             )

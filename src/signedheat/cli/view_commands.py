@@ -256,7 +256,7 @@ def deviation(arguments: Namespace) -> Summary:
         lines[0] += f"; {percent(summary['beyond_rim'])} beyond its rim"
     lines += [f"within ±{t}{shapes.unit_suffix(unit)}: {percent(share)}" for t, share in summary["within"].items()]
     lines += [
-        f"{row['deviation']:+.4g}{shapes.unit_suffix(unit)} at {shapes.point_in_words(row['at'])}" for row in worst
+        f"{row['deviation']:+.4g}{shapes.unit_suffix(unit)} at {shapes.place(row['at'], scan.bounds)}" for row in worst
     ]
     for output in arguments.output:
         deviations.save(output)
@@ -289,7 +289,7 @@ def thickness(arguments: Namespace) -> Summary:
     low, median, high = thicknesses.percentiles([5.0, 50.0, 95.0]).tolist()
     summary: dict[str, Any] = {"input": arguments.shape, "output": arguments.output, "units": unit}
     summary |= {"thinnest": least, "at": point.tolist(), "percentiles": {"5": low, "50": median, "95": high}}
-    where = f"{shapes.unit_suffix(unit)} at {shapes.point_in_words(point)}"
+    where = f"{shapes.unit_suffix(unit)} at {shapes.place(point, solid.bounds)}"
     text = f"{printable(arguments.shape)}: thinnest {least:.4g}{where}; "
     text += f"90 % of the area {low:.4g} to {high:.4g}, median {median:.4g}"
     if arguments.least is not None:

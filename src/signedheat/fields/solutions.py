@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy import sparse
 
-from ..arrays import Bools, Floats, Ints, mask_of
+from ..arrays import Bools, Floats, Ints, mask_of, place
 from ..diagnostics import Diagnostics, SampledSource, SmallLoops, TetsTurned
 from ..errors import InexactWarning, UnreachedWarning, UnsupportedTypeError, warn_user
 from ..geodesics.exact_distance import shortest_arcs
@@ -86,7 +86,7 @@ def unreached_vertices(domain: object, values: Floats) -> Ints:
 def _named(domain: object, vertex: int) -> str:
     """Name a vertex for a message by its coordinates, or by its number if the domain has no coordinates."""
     positions = getattr(domain, "vertices", getattr(domain, "points", None))
-    return f"number {vertex}" if positions is None else f"at ({', '.join(f'{x:.4g}' for x in positions[vertex])})"
+    return f"number {vertex}" if positions is None else f"at {place(positions[vertex], positions)}"
 
 
 @to_field.register

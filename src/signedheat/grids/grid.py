@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Frozen, short
+from ..arrays import Bools, Floats, Frozen, place, short
 from ..errors import GeometryError, MemoryLimitError
 from ..fields.field_domain import Exact, FieldDomain, different
 from ..mesh.box_tree import room_around
@@ -316,7 +316,8 @@ class Grid(Displayed, Frozen, FieldDomain, Generic[Dimension]):
 
     def __repr__(self) -> str:
         step = self.spacing[0] if np.ptp(self.spacing) <= 1e-12 * self.spacing[0] else self.spacing
-        return f"Grid(origin={short(self.origin)}, spacing={short(step)}, shape={self.shape})"
+        origin = place(self.origin, [self.origin, self.upper])[1:-1]
+        return f"Grid(origin=[{origin}], spacing={short(step)}, shape={self.shape})"
 
 
 def other_nodes() -> GeometryError:

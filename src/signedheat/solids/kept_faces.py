@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, place
 from ..errors import GeometryError, counted
 from ..grids.grid import RESOLUTION, Grid
 from ..mesh.arrangement import SAME_POINT, arranged, meeting_faces
@@ -102,18 +102,17 @@ def kept_surface(solid: Evaluated) -> KeptSurface:
         if not len(joined.bad):
             break
     if not best.open and (whole.open or len(best.bad) < len(whole.bad)):
-        return KeptSurface(_without_crumbs(best.mesh, used), f"faces kept but {_unjoined(used.middles)}")
-    x, y, z = whole.points[whole.bad[0]].mean(axis=0)
+        return KeptSurface(_without_crumbs(best.mesh, used), f"faces kept but {_unjoined(used.middles, solid.bounds)}")
+    first = place(whole.points[whole.bad[0]].mean(axis=0), solid.bounds)
     if whole.open:
-        return KeptSurface(surface, f"contoured: the faces do not join, first at ({x:.4g}, {y:.4g}, {z:.4g})")
-    return KeptSurface(whole.mesh, f"faces kept, but some cross, the first at ({x:.4g}, {y:.4g}, {z:.4g})")
+        return KeptSurface(surface, f"contoured: the faces do not join, first at {first}")
+    return KeptSurface(whole.mesh, f"faces kept, but some cross, the first at {first}")
 
 
-def _unjoined(places: Floats) -> str:
-    """Return words for a message: around how many of (k, 3) places the surface is a contour, and the first of them."""
-    x, y, z = places[0]
+def _unjoined(places: Floats, bounds: Floats) -> str:
+    """Return words for a message: around how many of (k, 3) places a surface is a contour, and the first."""
     around = "one place" if len(places) == 1 else f"{counted(len(places), 'place')}, the first"
-    return f"around {around} at ({x:.4g}, {y:.4g}, {z:.4g}), where they do not join: contoured there"
+    return f"around {around} at {place(places[0], bounds)}, where they do not join: contoured there"
 
 
 def _along(edges: Floats, step: float) -> Floats:

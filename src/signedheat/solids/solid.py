@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arrays import Bools, Floats, Frozen, Ints, short
+from ..arrays import Bools, Floats, Frozen, Ints, place
 from ..diagnostics import CompletedArea, Diagnostics, Note
 from ..errors import InexactWarning, SourceError, UnsupportedTypeError, counted, percent, warn_user
 from ..fields.field import Field
@@ -773,12 +773,12 @@ class Solid(Displayed, Represented, Frozen):
 
     def __repr__(self) -> str:
         areas, made = face_areas(self.triangles), self.origins < 0
-        low, high = (", ".join(short(float(x)) for x in corner) for corner in self.bounds)
+        low, high = (place(corner, self.bounds) for corner in self.bounds)
         share = float(areas[made].sum() / max(float(areas.sum()), np.finfo(float).tiny))
         notes = "; ".join(str(note) for note in self.diagnostics.important)
         return (
             f"Solid({counted(len(self.triangles), 'triangle')}, {percent(share)} of their area completed,\n"
-            f"      box from ({low}) to ({high}),\n"
+            f"      box from {low} to {high},\n"
             f"      {notes or 'as it was given'})"
         )
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, place
 from ..compiled import compiled
 from ..curves.cut_surface import CutSurface
 from ..errors import GeometryError
@@ -554,10 +554,10 @@ def _draw_thickness(thickness: Thickness, path: PathLike) -> None:
         bars: Any = {"color": _colors_of(middles, low, high, COLORS[::-1]) / 255, "edgecolor": "0.5", "linewidth": 0.5}
         histogram.bar(middles, counts, np.diff(limits), **bars)
         least, point = thickness.thinnest
-        where = ", ".join(f"{x:.4g}" for x in point)
+        where = place(point, thickness.mesh.bounds)
         median = thickness.percentiles([50])[0]
         histogram.set(xlabel=f"thickness (the last bar: all beyond {limits[-2]:.3g})", ylabel="% of the area")
-        histogram.set_title(f"thinnest {least:.4g}, at ({where})\nmedian {median:.4g}", fontsize=10)
+        histogram.set_title(f"thinnest {least:.4g}, at {where}\nmedian {median:.4g}", fontsize=10)
 
 
 def _draw_deviation(deviation: Deviation, path: PathLike) -> None:
