@@ -696,6 +696,13 @@ def as_polygons(mesh):
 
 
 BALL = samples.sphere(2)
+
+
+def nested_balls(*radii):
+    """Balls around one centre, those of negative radius inside out."""
+    return samples.union(*(sh.TriangleMesh(radius * BALL.vertices, BALL.faces) for radius in radii))
+
+
 CLEAN = {
     "ball": BALL,
     "far away": sh.TriangleMesh(BALL.vertices + 1e7, BALL.faces),
@@ -709,13 +716,20 @@ CLEAN = {
         samples.torus(1.0, 0.4, 24, 12), sh.TriangleMesh(0.5 * BALL.vertices, BALL.faces)
     ),
     "unused vertices": sh.TriangleMesh(np.concatenate([BALL.vertices, [[9, 9, 9]]]), BALL.faces),
+    "hollow": nested_balls(1.0, -0.5),
+    "a body in the cavity of a body": nested_balls(1.0, -0.75, 0.5),
+    "the cavity first": nested_balls(-0.5, 1.0),
+    "a hollow body in a cavity, and one beside them": samples.union(
+        nested_balls(-0.25, 0.5, -0.75, 1.0), sh.TriangleMesh(BALL.vertices + 5, BALL.faces)
+    ),
 }
 OTHERS = {
     "inwards": sh.TriangleMesh(BALL.vertices, BALL.faces[:, ::-1]),
     "open": sh.TriangleMesh(BALL.vertices, BALL.faces[1:]),
     "twice": sh.TriangleMesh(BALL.vertices, np.concatenate([BALL.faces, BALL.faces])),
     "nested": samples.union(BALL, sh.TriangleMesh(0.5 * BALL.vertices, BALL.faces)),
-    "hollow": samples.union(BALL, sh.TriangleMesh(0.5 * BALL.vertices, BALL.faces[:, ::-1])),
+    "two bodies in one": nested_balls(1.0, 0.5, 0.25),
+    "two cavities in one": nested_balls(1.0, -0.5, -0.25),
     "one inwards": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 5, BALL.faces[:, ::-1])),
     "touching": sh.TriangleMesh(*joined(box(n=1), box((0.5, 0.5, 0.5), (1, 0.2, 0.2), n=1))),
     "crossing": samples.union(BALL, sh.TriangleMesh(BALL.vertices + 1, BALL.faces)),
@@ -743,6 +757,15 @@ def test_what_is_closed_and_clean_is_taken_as_everything_else_would_make_it(name
         same_solids(sh.complete(CLEAN[name], as_oriented=as_oriented), checked)
     monkeypatch.setattr(completion, "solid_as_given", lambda _: None)
     same_solids(sh.complete(CLEAN[name], as_oriented=as_oriented), checked)
+
+
+@pytest.mark.parametrize("nested", ["given", "cavities", "bodies"])
+@pytest.mark.parametrize("radii", [(1.0, -0.7), (1.0, -0.75, 0.5), (-0.25, 0.5, -0.75, 1.0)])
+def test_nested_surfaces_that_are_closed_face_as_everything_else_would_make_them(nested, radii, monkeypatch):
+    checked = sh.complete(nested_balls(*radii), nested=nested)
+    assert checked.inside([[0.6, 0.0, 0.0]])[0] == (nested == "bodies")
+    monkeypatch.setattr(completion, "solid_as_given", lambda _: None)
+    same_solids(sh.complete(nested_balls(*radii), nested=nested), checked)
 
 
 @pytest.mark.parametrize("name", list(OTHERS))

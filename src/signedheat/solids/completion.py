@@ -272,10 +272,13 @@ def completed(shape: ShapeLike | Sequence[ShapeLike], options: Completion, metho
         with stopwatch("complete"):
             solid = run_cancellable(partial(_from_points, cloud, method))
     else:
-        notes, owners = [] if options.as_oriented else [ShapeOriented()], owners_of(joined)
+        notes, owners = list[Note](), owners_of(joined)
+        as_given: tuple[Solid, ShapeOriented] | None = None
         with stopwatch("orient"):
-            by_lids = options.completion == "lids"
-            as_given = run_cancellable(partial(solid_as_given, joined.triangulation)) if by_lids else None
+            if options.completion == "lids":
+                as_given = run_cancellable(partial(solid_as_given, joined.triangulation))
+            if as_given and as_given[1].cavities and options.nested == "bodies" and not options.as_oriented:
+                as_given = None  # the cavities must be flipped
             if as_given is None:
                 triangles, cut_from = divided_at_rims(joined.triangulation)
                 owners = owners[cut_from]
@@ -291,7 +294,8 @@ def completed(shape: ShapeLike | Sequence[ShapeLike], options: Completion, metho
                 solid = run_cancellable(partial(_from_mesh, triangles, chain, decided, options, method))
                 solid = _with_whole_boundary(solid, triangles)
             else:
-                solid = as_given
+                solid, unchanged = as_given
+                notes = [] if options.as_oriented else [unchanged]
             solid = replace(solid, origins=np.where(solid.origins >= 0, owners[solid.origins], -1))
     source = joined if isinstance(joined, TriangleMesh) else None
     diagnostics = Diagnostics(timings=dict(stopwatch.seconds), notes=(*notes, *solid.diagnostics.notes))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Bools, Floats, Ints
-from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note
+from ..diagnostics import BoundsNothing, Diagnostics, LeftOut, Note, ShapeOriented
 from ..errors import GeometryError, OutsideError, SourceError
 from ..mesh.arrangement import SAME_POINT, Arrangement, arranged
 from ..mesh.components import boxes_of, element_components, first_members
@@ -53,10 +53,10 @@ class TriangleGroup:
         return cls(triangles, ids, np.full(len(triangles), -1), closing)
 
 
-def solid_as_given(mesh: TriangleMesh) -> Solid | None:
-    """Return the solid of a mesh of closed surfaces if all face outwards, and none crosses or contains another.
+def solid_as_given(mesh: TriangleMesh) -> tuple[Solid, ShapeOriented] | None:
+    """Return the solid of a mesh of closed surfaces, and a note, if none crosses another and all face out of the solid.
 
-    Otherwise return None.
+    All but those of cavities face outwards. Otherwise return None.
     """
     points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
     table = edge_table(faces)
@@ -68,15 +68,24 @@ def solid_as_given(mesh: TriangleMesh) -> Solid | None:
     corners = triangles - triangles[firsts, :1][surfaces]  # so that no digits cancel far away
     vectors = area_vectors(corners)
     volumes = np.bincount(surfaces, np.einsum("ij,ij->i", corners[:, 0], vectors))
-    if (volumes <= 0).any() or not vectors.any(axis=1).all():
+    outwards = volumes > 0
+    if not outwards.any() or not volumes.all() or not vectors.any(axis=1).all():
         return None
     if len(overlapping_faces(points, faces, tolerances(points, faces, SAME_POINT))):
         return None
-    windings = Windings(triangles, open_edges=points[table.vertices[table.balance != 0]])
-    if len(firsts) > 1 and windings.sides(triangles[firsts])[1].any():
-        return None
+    no_edges = points[table.vertices[table.balance != 0]]
+    windings, nested = Windings(triangles, open_edges=no_edges), 0
+    if len(firsts) > 1:
+        behind, ahead = windings.sides(triangles[firsts])
+        if ahead.any() or not behind.all():
+            return None
+    if 1 < outwards.sum() < len(firsts):  # bodies may lie in cavities of others
+        of_bodies = Windings(triangles[outwards[surfaces]], open_edges=no_edges)
+        nested = int(of_bodies.sides(triangles[firsts[outwards]])[1].sum())
+    note = ShapeOriented(nested_bodies=nested, cavities=int((~outwards).sum()))
     all_bounding, full_confidence = np.ones(len(faces), dtype=np.bool_), np.ones(len(faces), dtype=np.float32)
-    return Solid(triangles, np.arange(len(faces)), full_confidence, all_bounding, windings, mesh, uncrossed=True)
+    solid = Solid(triangles, np.arange(len(faces)), full_confidence, all_bounding, windings, mesh, uncrossed=True)
+    return solid, note
 
 
 def united(

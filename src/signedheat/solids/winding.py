@@ -74,7 +74,8 @@ class Windings(Frozen):
     def sides(self, triangles: Floats) -> tuple[Bools, Bools]:
         """(n,) whether points just behind (n, 3, 3) triangles are inside, and (n,) the same just in front of them."""
         step, centres = steps_off(triangles, OFF_FACE), triangles.mean(axis=1)
-        return self.inside(centres - step), self.inside(centres + step)
+        behind, ahead = np.split(self.numbers_once(np.concatenate([centres - step, centres + step])), 2)
+        return behind > INSIDE_WINDING, ahead > INSIDE_WINDING
 
 
 def open_edges_of(triangles: Floats) -> Floats:
