@@ -67,6 +67,22 @@ def test_distance_to_a_network_of_roads():
     assert sh.signed_distance(backwards, mesh, completion="none").values == pytest.approx(field.values, abs=1e-9)
 
 
+@pytest.mark.parametrize(("end", "n"), [((0.0, -100.0), 20), ((0.0, -100.0), 200), ((400.0, 100.0), 50)])
+def test_distance_to_lines_that_graze_vertices_is_not_negative(end, n):
+    """Of a road over a hill, whose points are beside the mesh, so that it passes vertices within rounding."""
+    sides = np.linspace(-500.0, 500.0, 21)
+    plane = np.stack(np.meshgrid(sides, sides, indexing="ij"), axis=-1).reshape(-1, 2)
+
+    def on_the_hill(points):
+        return np.column_stack([points, 80.0 * np.exp(-(points**2).sum(axis=1) / 2e5)])
+
+    first = (np.arange(20)[:, None] * 21 + np.arange(20)).ravel()
+    faces = np.concatenate([np.add.outer(first, corners) for corners in ([0, 21, 22], [0, 22, 1])])
+    hill = sh.TriangleMesh(on_the_hill(plane), faces)
+    road = hill.polyline(on_the_hill(np.linspace((-400.0, -300.0), end, n)))
+    assert sh.signed_distance(road, hill, completion="none").values.min() >= 0.0
+
+
 def test_points_are_no_sheet():
     with refused(sh.errors.SourceError, element="completion"):
         sh.complete(sh.PointCloud(samples.sphere(2).vertices), completion="none")

@@ -163,14 +163,13 @@ class PausedSearch:
 
         If the search has not reached a vertex, its distance is the length of a path along edges.
         """
-        distance = self.search.distance
+        distance = np.maximum(self.search.distance, 0.0)  # merging windows can make distances slightly negative
         if np.isfinite(self.reach) and self.has_ended:
             return np.where(distance <= self.reach, distance, np.inf)
         if self.has_ended and np.isfinite(distance).all():
             return distance
         reached = np.flatnonzero(np.isfinite(distance))
-        # merging windows can make distances slightly negative, which Dijkstra's algorithm does not allow
-        along = distances_along_edges(self.triangles, reached, np.maximum(distance[reached], 0.0))
+        along = distances_along_edges(self.triangles, reached, distance[reached])
         # a search that has ended has not reached other components, nor what lies beyond edges as short as rounding
         return np.where(np.isinf(distance), along, distance) if self.has_ended else along
 
