@@ -50,6 +50,26 @@ def test_contours_say_how_far_they_are_from_the_faces(tmp_path, folder, capsys):
 
 
 @pytest.mark.usefixtures("in_this_process")
+def test_surfaces_through_loose_triangles_and_points_say_that_no_face_is_kept(tmp_path, capsys):
+    """Distances are measured where something was given: not from the surface, and from points not at all."""
+    ball = samples.sphere(3)
+    corners = ball.vertices[ball.faces].reshape(-1, 3)
+    loose = corners + np.random.default_rng(0).normal(0.0, 0.01, corners.shape)
+    sh.TriangleMesh(loose, np.arange(len(loose)).reshape(-1, 3)).save(tmp_path / "loose.ply")
+    sh.PointCloud(ball.vertices).save(tmp_path / "points.ply")
+    line = ["watertight", str(tmp_path / "loose.ply"), str(tmp_path / "points.ply"), "-o", str(tmp_path / "out")]
+    assert main([*line, "--json", "--surface", "ply"]) == 0
+    loosely, by_points = json.loads(capsys.readouterr().out)["shapes"]
+    away = np.abs(sh.complete(sh.read(tmp_path / "out" / "loose.ply")).distance(loose)).max()
+    assert away > 0.01 and away <= loosely["from_faces"] <= away + 0.01
+    assert by_points["from_faces"] is None
+    for found in (loosely, by_points):
+        assert found["to_faces"] is None and found["way"] == "no face kept"
+    assert main([*line[:2], "-o", str(tmp_path / "loose.stl")]) == 0
+    assert f"{loosely['from_faces']:.2g} from the given faces to it at most" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(("surface", "bad_edges"), [("stl", 1), ("ply", 0)])
 def test_edges_that_the_format_joins_are_counted(tmp_path, capsys, surface, bad_edges):
     """STL files have no ids: two cubes that touch along an edge have one of four faces there."""

@@ -424,7 +424,8 @@ class Watertight:
             return contour(), "contoured"
         kept = kept_surface(solid)
         mesh = kept.mesh if self.tolerance is None else simplified(kept.mesh, self.tolerance)
-        return mesh, kept.note or "faces kept"
+        any_given = bool((solid.bounding & (solid.origins >= 0)).any())
+        return mesh, kept.note or ("faces kept" if any_given else "no face kept")
 
 
 CONTOUR_RESOLUTION = 256
@@ -442,7 +443,8 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
 
     The surface should have the distance `level` from the solid. ``to_faces`` is the largest deviation from that
     distance, measured from points of the surface whose nearest face was given. ``from_faces`` is the largest deviation
-    measured from points of the given faces.
+    measured from points of the given faces that bound the solid; of all given faces, if none does. A number is None if
+    there is no point to measure it from.
     """
     corners = surface.vertices[surface.faces]
     volumes = part_volumes(surface.vertices, surface.faces)[1]
@@ -451,7 +453,9 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
     closest = solid.closest(_measured_points(corners))
     to_faces = np.abs(closest.distances - level)[~closest.completed]
     tree = FaceTree.of_triangles(corners)
-    from_faces = tree.distances(_measured_points(given)) - level if len(given) else np.zeros(1)
+    if not len(given) and solid.source is not None:  # loose triangles, through which the completion runs
+        given = solid.source.vertices[solid.source.faces]
+    from_faces = np.abs(tree.distances(_measured_points(given)) - level)
     return {
         "bodies": int((volumes > 0).sum()),
         "vertices": surface.n_vertices,
@@ -460,8 +464,8 @@ def figures_of(surface: TriangleMesh, solid: Solid, level: float = 0.0) -> dict[
         "area": float(face_areas(corners).sum()),
         "openings": _openings(made),
         "completed_area": float(face_areas(made).sum()),
-        "to_faces": float(to_faces.max(initial=0.0)),
-        "from_faces": float(np.abs(from_faces).max(initial=0.0)),
+        "to_faces": float(to_faces.max()) if len(to_faces) else None,
+        "from_faces": float(from_faces.max()) if len(from_faces) else None,
     }
 
 

@@ -231,9 +231,18 @@ def in_words(figures: dict[str, object]) -> str:
     return (
         f"{bodies} {'body' if bodies == 1 else 'bodies'}, volume {volume}, {figures['faces']} faces, "
         f"{openings} {'opening' if openings == 1 else 'openings'} completed ({percent(share, 2)} of the area), "
-        f"{figures['to_faces']:.2g}{unit} from the faces and {figures['from_faces']:.2g}{unit} back at most, "
+        f"{_distances_in_words(figures['to_faces'], figures['from_faces'], unit)}"
         f"{bad_edges}{crossings or 'no'} self-intersections; {figures['way']}"
     )
+
+
+def _distances_in_words(to_faces: Any, from_faces: Any, unit: str) -> str:
+    """Return words for the largest distances from a surface to the faces that were given, and back, or None if none."""
+    if from_faces is None:
+        return ""
+    if to_faces is None:
+        return f"{from_faces:.2g}{unit} from the given faces to it at most, "
+    return f"{to_faces:.2g}{unit} from the faces and {from_faces:.2g}{unit} back at most, "
 
 
 def run_on_each(
