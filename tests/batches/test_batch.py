@@ -253,6 +253,13 @@ def test_what_is_no_batch_says_so(tmp_path, files, monkeypatch):
     with pytest.raises(sh.errors.SignedHeatError) as caught:
         sh.batches.run(folder, tmp_path / "out", lambda path, stem: {})
     assert "module" in caught.value.remedy
+    for job in (None, {"volume": ".npz"}, os.path.getsize, lambda path: {}):
+        with pytest.raises(sh.errors.SignedHeatError):
+            sh.batches.run(folder, tmp_path / "out", job)
+    ball = sh.samples.sphere(1)
+    for inputs, results in ((ball, "out"), ([ball], "out"), (folder, ball), ([3], "out")):
+        with pytest.raises(sh.errors.UnsupportedTypeError):
+            sh.batches.run(inputs, tmp_path / results if results == "out" else results, measure)
     with pytest.raises(sh.errors.SignedHeatError):
         sh.batches.run(folder, tmp_path / "out", measure, workers=0)
     with pytest.raises(sh.errors.SignedHeatError):

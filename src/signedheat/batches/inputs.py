@@ -83,6 +83,7 @@ def named_path(name: str | os.PathLike[str]) -> Path:
 
     That is a name with a null character, or a relative one in a folder that has been deleted.
     """
+    extension(name)  # refuses what is no name
     if not os.fspath(name) or "\0" in str(name):
         cause = "holds a null character" if os.fspath(name) else "is empty"
         raise FileFormatError(f"the name {cause}", remedy="name a file or a folder, or . for this one", path=name)

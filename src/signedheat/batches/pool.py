@@ -408,13 +408,16 @@ def run(
     Batch(3 of 3 shapes done, 0 of them before)
     """
     callback(progress, "progress(fraction, text)")
+    if job is None:
+        raise SignedHeatError("there is no job", remedy="pass a Job", element="job")
+    callback(job, "job(path, stem)")
     if scheduler is not None:
         require("distributed", "clusters")
     workers, threads, time_limit = _checked_limits(workers, threads, time_limit)
     target = named_path(folder)
     if os.path.lexists(target) and not target.is_dir():
         raise FileFormatError("this is not a folder", remedy="choose another one", path=target)
-    shapes = expand([inputs] if isinstance(inputs, str | os.PathLike) else inputs, target)
+    shapes = expand(inputs if isinstance(inputs, Iterable) and not isinstance(inputs, str) else [inputs], target)
     if isinstance(job, Job):
         job.refuse_shared_names(shapes)
     description = _description_of(job)
