@@ -14,6 +14,12 @@ MISTAKES = {
     "float faces": ((V, F.astype(float)), "integers"),
     "faces first": ((F, V), "(vertices, faces)"),
     "vertices in the plane": ((V[:, :2], F), "z = 0"),
+    "vertices in columns": ((V.T, F), "vertices.T"),
+    "six numbers for each vertex": ((np.hstack([V, V]), F), "3 for each"),
+    "faces in columns": ((V, F.T), "faces.T"),
+    "faces as in PyVista": ((V, np.insert(F, 0, 3, axis=1)), "faces[:, 1:]"),
+    "faces as in PyVista, in one row": ((V, np.insert(F, 0, 3, axis=1).ravel()), "faces.reshape(-1, 4)[:, 1:]"),
+    "quads as in PyVista": ((V, np.array([[4, 0, 1, 4, 2], [4, 5, 6, 7, 8]])), "faces[:, 1:]"),
     "points alone": ([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]], "PointCloud"),
     "an array of points": (V, "PointCloud"),
 }
@@ -34,6 +40,24 @@ def test_arrays_that_are_no_shape_say_what_is_wrong(name, call):
         assert word in str(caught.value)
     else:
         assert "int" in str(caught.value)
+
+
+@pytest.mark.parametrize("quads", [
+    [[3, 0, 1, 2]], [[3, 0, 1, 2], [3, 2, 4, 5]], [[0, 1, 2, 2], [0, 2, 4, 4], [0, 4, 5, 5]],
+])  # fmt: skip
+def test_quads_around_one_vertex_and_quads_that_are_triangles_are_quads(quads):
+    assert sh.as_shape((V, np.array(quads))).n_polygons == len(quads)
+
+
+@pytest.mark.parametrize(("points", "make", "remedy"), [
+    ([[0, 1], [1, 0], [1, 1]], BALL.polyline, "3 coordinates"),
+    ([[0, 1, 2], [1, 0, 2]], sh.Polyline, "2 coordinates"),
+    ([[0, 1, 2, 3], [1, 0, 2, 3]], sh.Polyline, "points.T"),
+])  # fmt: skip
+def test_points_of_another_dimension_are_not_columns(points, make, remedy):
+    with refused(sh.SignedHeatError) as caught:
+        make(np.array(points, dtype=float))
+    assert remedy in caught.value.remedy
 
 
 @pytest.mark.parametrize("lines", [1, 2])

@@ -86,6 +86,15 @@ def whole_numbers(values: object, name: str, error: type[SignedHeatError] = Geom
     return array.astype(np.int64)
 
 
+def _rows_instead(array: NDArray[Any], columns: int | None, name: str) -> str | None:
+    """Return a remedy for an array that has no rows of so many numbers, or None if there is none."""
+    if columns is None or array.ndim != 2:
+        return None
+    if array.shape[1] in (2, 3):  # points in the plane or in space, even if there are two or three
+        return f"give {columns} coordinates for each point" if columns in (2, 3) else None
+    return f"pass {name}.T" if array.shape[0] == columns else None
+
+
 def array_of(values: object, name: str, error: type[SignedHeatError] = GeometryError) -> NDArray[Any]:
     """Return `values` as a NumPy array of any type, not copied if possible; raise an error if rows differ in length.
 
@@ -112,7 +121,7 @@ def finite_rows(
     array = numbers(values, name, error)
     if array.ndim != 2 or (columns is not None and array.shape[1] != columns) or array.shape[1] == 0:
         wanted = f"(n, {columns})" if columns is not None else "(n, d)"
-        remedy = f"pass {name}.T" if columns is not None and array.ndim == 2 and array.shape[0] == columns else None
+        remedy = _rows_instead(array, columns, name)
         raise error(f"{name} must have shape {wanted}, not {array.shape}", remedy=remedy, element=name)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
@@ -313,7 +322,7 @@ def element_ids(values: object, name: str, corners: int, n_vertices: int) -> Int
     if array.ndim != 2 or array.shape[1] != corners:
         raise GeometryError(
             f"{name} must have shape (m, {corners}), not {array.shape}",
-            remedy=_other_layout(array, name, corners),
+            remedy=other_layout(array, name, corners),
             element=name,
         )
     if array.dtype.kind not in "iuO":
@@ -345,7 +354,7 @@ def from_zero(ids: Ints, n_vertices: int, name: str) -> str | None:
     return f"they are counted from 1, so pass {name} - 1" if ids.min() == 1 and ids.max() == n_vertices else None
 
 
-def _other_layout(array: NDArray[Any], name: str, corners: int) -> str | None:
+def other_layout(array: NDArray[Any], name: str, corners: int) -> str | None:
     """Return a remedy for faces or tets in a layout that other packages use, or None if this is none of them."""
     if array.ndim == 2 and array.shape[1] == corners + 1 and (array[:, 0] == corners).all():
         return f"pass {name}[:, 1:], without the numbers of corners"
@@ -356,6 +365,22 @@ def _other_layout(array: NDArray[Any], name: str, corners: int) -> str | None:
     if array.ndim == 2 and array.shape[1] > corners == 3:
         return "pass quads and other polygons to sh.PolygonMesh(vertices, polygons)"
     return None
+
+
+def refuse_other_layout(faces: NDArray[Any]) -> None:
+    """Raise an error if (m, k) faces are in a layout of other packages, in which they would name vertices twice.
+
+    Either each begins with the number of its corners, or they are columns.
+    """
+    if faces.ndim != 2 or faces.shape[1] < 4:
+        return
+    corners = faces.shape[1] - 1
+    if (faces[:, 0] == corners).all() and (faces[:, 1:] == corners).any():
+        cause = f"every face begins with {corners}, which some name again: that is the number of their corners"
+        raise GeometryError(cause, remedy=other_layout(faces, "faces", corners), element="faces")
+    if len(faces) in (3, 4) and corners >= 4 and (np.diff(np.sort(faces, axis=1), axis=1) == 0).any(axis=1).all():
+        cause = f"every one of {len(faces)} faces with {corners + 1} corners names a vertex twice: they are columns"
+        raise GeometryError(cause, remedy="pass faces.T", element="faces")
 
 
 def used_bounds(points: Floats, ids: Ints) -> Floats:

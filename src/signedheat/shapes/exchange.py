@@ -19,7 +19,7 @@ from ..errors import GeometryError, UnsupportedTypeError
 from ..mesh.components import members_of
 from ..mesh.tet_shapes import face_table, signed_volumes
 from ..packages import lazy_module
-from ..validation import array_of, coordinates, element_ids
+from ..validation import array_of, coordinates, element_ids, refuse_other_layout
 
 ACCEPTED_SHAPES = "a shape of signedheat, trimesh, PyVista, meshio or Open3D, or a pair (vertices, faces)"
 """Description, for error messages, of the objects that functions accept as a shape."""
@@ -633,6 +633,7 @@ def from_arrays(pair: Any) -> Elements:
     """Convert a pair (vertices, faces) of rows of positions and rows of vertex ids, which may differ in length."""
     points, faces = (array_of(part, "vertices and faces") if np.ma.isMaskedArray(part) else part for part in pair)
     if getattr(faces, "ndim", 0) == 2 and faces.dtype != object:
+        refuse_other_layout(np.asarray(faces))
         flat = np.asarray(faces).astype(np.int64).ravel()
         return Elements(np.asarray(points), flat, np.full(faces.shape[0], faces.shape[1]))
     rows = faces if isinstance(faces, list | tuple) else list(np.asarray(faces))

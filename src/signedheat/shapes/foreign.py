@@ -18,7 +18,7 @@ from ..surfaces.point_cloud import PointCloud
 from ..surfaces.polygon_mesh import PolygonMesh
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
-from ..validation import is_pair, like_array, public_call
+from ..validation import is_pair, like_array, other_layout, public_call
 from .exchange import ACCEPTED_SHAPES, ELEMENTS_OF, Elements
 from .geometries import geometry_of, polylines_of
 
@@ -169,9 +169,10 @@ def refuse_arrays(things: Sequence[object]) -> None:
     if not arrays or len(arrays) < len(things) or any(array.dtype.kind not in "biuf" for array in arrays):
         return
     if len(arrays) != 2 or any(array.ndim != 2 for array in arrays):
+        rows = other_layout(arrays[1], "faces", 3) if len(arrays) == 2 and arrays[1].ndim == 1 else None
         raise UnsupportedTypeError(
-            "arrays of numbers alone are not a shape",
-            remedy="pass sh.PointCloud(points), or a pair (vertices, faces)",
+            "arrays of numbers alone are not a shape" if rows is None else "faces are not rows of vertex numbers",
+            remedy=rows or "pass sh.PointCloud(points), or a pair (vertices, faces)",
             element="shape",
         )
     vertices, faces = arrays
@@ -179,7 +180,9 @@ def refuse_arrays(things: Sequence[object]) -> None:
         cause, remedy = "the faces come before the vertices", "pass (vertices, faces)"
     elif vertices.shape[1] != 3:
         cause = f"vertices have {vertices.shape[1]} coordinates each, and lie in space with 3"
-        remedy = "add z = 0; for drawings in the plane pass sh.Polyline"
+        other = "pass vertices.T" if len(vertices) == 3 else "give 3 for each"
+        in_plane = "add z = 0; for drawings in the plane pass sh.Polyline"
+        remedy = in_plane if vertices.shape[1] == 2 else other
     else:
         cause, remedy = f"faces are rows of vertex numbers, not of {faces.dtype}", "pass faces.astype(int)"
     raise UnsupportedTypeError(cause, remedy=remedy, element="shape")

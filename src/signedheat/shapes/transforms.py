@@ -134,6 +134,16 @@ Body: TypeAlias = tuple[Floats, Ints]
 """Vertices, (n, 3), and faces, (m, 3), of a triangle mesh."""
 
 
+MEASURED_OTHERWISE = {
+    "PointCloud": "join points to one cloud",
+    "DigitalSurface": "pass its smooth_surface",
+    "Polyline": "measure to lines in the plane by signed_distance(lines), and move them by morphology.dilate or erode",
+    "Curve": "measure along its surface, by signed_distance(curve, surface)",
+    "SurfacePoints": "measure along their surface, by signed_distance(points, surface)",
+}
+"""What to do instead, by the kind of a source that distance in space is not measured to."""
+
+
 def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
     """Join several meshes into a triangle mesh; return a single mesh or cloud as it is. Tets become their boundary."""
     shapes = [part.boundary if isinstance(part, TetMesh) else part for part in as_shapes(shape)]
@@ -150,8 +160,7 @@ def joined_shape(shape: ShapeLike | Sequence[ShapeLike]) -> SurfaceShape:
             raise SourceError(
                 f"distance in space is measured to meshes or to one point cloud, and source {index} is a "
                 f"{type(part).__name__}",
-                remedy="join points to one cloud, pass the smooth_surface of voxels, and measure to curves on their "
-                "surface, to lines in the plane on a grid in it",
+                remedy=MEASURED_OTHERWISE.get(type(part).__name__, "pass meshes"),
                 element=f"source {index}",
             )
         meshes.append(part)
