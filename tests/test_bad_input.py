@@ -404,7 +404,7 @@ OTHERS = [
     ("sample ball.ply -o out.npz --near 2", 2, "more than 1"),
     ("sample ball.ply -o out.npz --widths=-1", 2, "negative"),
     ("sample ball.ply -o out.npz -n 0", 2, "whole number"),
-    ("sample ball.ply -o out.npz --mask a.npy", 2, "unrecognized"),
+    ("sample ball.ply -o out.npz --mask a.npy", 2, "sample: unrecognized"),
     ("sample ball.ply -o out.npz --constraint each-component", 1, "distance to a shape is zero on all of it"),
     ("sample ball.ply -o out.txt", 1, "not a known format"),
     ("batch ball.ply -o made", 2, "no results"),

@@ -86,6 +86,13 @@ class Parser(argparse.ArgumentParser):
         say(f"{self.prog}: {shortened(' '.join(words))} (see {self.prog} --help)")
         raise SystemExit(2)
 
+    def parse_known_args(self, *args: Any, **kwargs: Any) -> Any:
+        """Parse arguments; what a command does not know is an error of this command, whose help lists what it knows."""
+        known, others = super().parse_known_args(*args, **kwargs)
+        if others:
+            self.error(f"unrecognized arguments: {' '.join(others)}")
+        return known, others
+
     def _print_message(self, message: str, file: object = None) -> None:
         """Print help by `write_out`, whatever the file."""
         write_out(message.rstrip("\n"))  # only help and version; errors go through `error`

@@ -282,6 +282,8 @@ def fill(arguments: Namespace) -> Summary:
     sh.save(filled, arguments.output)
     counts = {"filled": len(filled.filled), "left": len(filled.left), "new_faces": int((filled.origins < 0).sum())}
     text = "holes filled: {filled}, by {new_faces} faces; boundary loops left open: {left}".format(**counts)
+    if counts["left"] and arguments.largest is None and not arguments.rims:
+        text += ", which `signedheat watertight` closes if they bound a solid"
     summary = {"input": arguments.mesh, "output": arguments.output, **counts}
     return summary, f"{printable(arguments.output)}: {text}"
 
