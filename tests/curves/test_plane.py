@@ -127,6 +127,45 @@ def is_inside(corners, x, y):
     return meetings % 2 == 1
 
 
+@pytest.mark.parametrize("step", [1e-15, 1e-13, 1e-12, 1e-10, 1e-9, 1e-8])
+@pytest.mark.parametrize("place", [0.0, 1e3])
+def test_segments_that_are_short_beside_rounding_have_no_say(step, place):
+    """A square that misses its first corner by a step in any direction, and one with all corners given twice."""
+    rng = np.random.default_rng(1)
+    points = np.concatenate([rng.uniform(-3, 3, (1000, 2)), rng.normal(size=(100, 2)) * 1e3])
+    for _ in range(10):
+        angle = rng.uniform(0, np.pi)
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        open_ring = np.vstack([SQUARE, SQUARE[:1]]) + step * rng.normal(size=(5, 2))
+        twice = np.repeat(SQUARE, 2, axis=0) + step * rng.normal(size=(8, 2))
+        for line in (sh.Polyline(open_ring @ turn + place), sh.Polyline(twice @ turn + place, closed=True)):
+            found = sh.signed_distance(line, resolution=16).closest(points @ turn + place).distances
+            np.testing.assert_allclose(found, distance_to_box(points, (-1, -1), (1, 1)), atol=1e-7)
+
+
+@pytest.mark.parametrize("slit", [0.0, 1e-13, 3e-13, 1e-12, 2e-12, 1e-9])
+def test_boxes_that_nearly_touch_have_sides(slit):
+    points = np.random.default_rng(2).uniform([-1.3, -1.3], [3.3, 1.3], (500, 2))
+    exact = np.minimum(distance_to_box(points, (-1, -1), (1, 1)), distance_to_box(points, (1, -1), (3, 1)))
+    for angle in np.linspace(0.0, 3.0, 20):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        boxes = [sh.Polyline((SQUARE + move) @ turn, closed=True) for move in ([0, 0], [2 + slit, 0])]
+        found = sh.signed_distance(boxes, resolution=16)(points @ turn)
+        away = np.abs(exact) > 1e-6
+        np.testing.assert_array_equal(found[away] < 0, exact[away] < 0)
+
+
+@pytest.mark.parametrize("place", [0.0, 1e6, 1e8])
+def test_walls_that_end_in_other_walls_are_one_wherever_they_are(place):
+    """A box beside another that is higher: far from the origin, its corners lie off the wall by rounding."""
+    for angle in np.linspace(0.05, 3.0, 20):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        boxes = [SQUARE, SQUARE * [1, 0.5] + [2, 0.1]]
+        field = sh.signed_distance([sh.Polyline(box @ turn + place, closed=True) for box in boxes], resolution=16)
+        found = field.closest(np.array([[1.0, 0.1], [0.9, 0.1]]) @ turn + place).distances
+        np.testing.assert_allclose(found, [-0.5, -np.hypot(0.5, 0.1)], atol=1e-9 + 1e-15 * place)
+
+
 def test_outlines_unite_whichever_way_they_run():
     moves = np.array([[0, 0], [0.5, 0.3], [-0.3, 0.9], [4, 0]])
     outlines = [(SQUARE + move)[::step] for move, step in zip(moves, (1, -1, 1, -1), strict=True)]

@@ -23,7 +23,8 @@ from ..jobs import Stopwatch, bound_progress, part_of_work, run_cancellable
 from ..mesh.components import sums_of
 from ..mesh.polylines import FillRule, without_seams
 from ..mesh.unit_vectors import unit
-from ..search.face_tree import FaceTree
+from ..mesh.welding import ONE_PLACE
+from ..search.face_tree import EQUALLY_NEAR, FaceTree
 from ..shapes.area_elements import bounds_around
 from ..shapes.foreign import as_list
 from ..shapes.kinds import Sources
@@ -278,19 +279,22 @@ class Drawing(Frozen):
         return tree_of(self._segments)
 
     @cached_property
-    def _corners(self) -> tuple[Ints, Floats, Ints]:
+    def _corners(self) -> tuple[Ints, Floats, Ints, Floats]:
         """Return the c distinct ends of lines, called corners, and what meets there.
 
         These are (m, 2) the corner at both ends of each segment, (c, 2) the sum of the unit normals of the segments at
-        each corner, and (c,) the number of these segments.
+        each corner, (c,) the number of these segments, and (c,) the length of the shortest of them.
         """
         along = self.lines[:, 1] - self.lines[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
         corners, places = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
+        shortest = np.full(len(corners), np.inf)
+        np.minimum.at(shortest, places.ravel(), np.repeat(np.linalg.norm(along, axis=1), 2))
         return (
             places.reshape(-1, 2),
             sums_of(np.repeat(normals, 2, axis=0), places.ravel(), len(corners)),
             np.bincount(places.ravel()),
+            shortest,
         )
 
     def distance(self, points: ArrayLike) -> Floats:
@@ -346,20 +350,23 @@ class Drawing(Frozen):
         the sum of the normals of all segments there decides. Where this is unreliable and lines are closed outlines,
         the number of outlines around the point decides.
         """
-        corners, sums, counts = self._corners
+        corners, sums, counts, shortest = self._corners
         ends = self.lines[nearest]
         along = ends[:, 1] - ends[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
         crowded = np.zeros(len(points), dtype=bool)
-        reach = 1e-9 * np.linalg.norm(along, axis=1)
+        away = np.linalg.norm(points - places, axis=1)
+        # of the ends of a segment that is not longer than this, rounding decides which is nearer
+        least = EQUALLY_NEAR * away + ONE_PLACE * np.spacing(np.abs(self.lines).max(initial=0.0))
+        reach = np.maximum(1e-9 * np.linalg.norm(along, axis=1), least)
         for end in range(2):
             is_end = np.linalg.norm(places - ends[:, end], axis=1) <= reach
             corner = corners[nearest, end]
             normals = np.where(is_end[:, None], sums[corner], normals)
-            crowded |= is_end & (counts[corner] > 2)
+            crowded |= is_end & ((counts[corner] > 2) | (shortest[corner] <= least))
         heights = ((points - places) * normals).sum(axis=1)
         sides = np.where(heights < 0, -1.0, 1.0)
-        crowded |= np.abs(heights) <= LEAST_SLOPE * np.linalg.norm(points - places, axis=1)
+        crowded |= np.abs(heights) <= LEAST_SLOPE * away
         if self.phi is None and crowded.any():  # outlines touch, normals cancel at spikes, or corners are near
             sides[crowded] = np.where(_enclosed(self.lines, points[crowded]), -1.0, 1.0)
         return sides

@@ -12,6 +12,7 @@ from ..packages import lazy_module
 from ..validation import chosen
 from .box_tree import BoxTree
 from .triangles import AREA_ROUNDING
+from .welding import ONE_PLACE, welded
 
 manifold3d: Any = lazy_module("manifold3d", "drawings of closed outlines")
 
@@ -102,15 +103,18 @@ def without_seams(segments: Floats) -> Floats:
     Returns (j, 2, 2) segments.
     """
     # where outlines share a line, the boundary of the filled region runs along it there and back, up to rounding
-    near = 1e-12 * float(np.ptp(segments.reshape(-1, 2), axis=0).max(initial=0.0))
-    if near == 0:
+    places = np.pad(segments.reshape(-1, 2), ((0, 0), (0, 1)))
+    size, largest = float(np.ptp(places, axis=0).max(initial=0.0)), float(np.abs(places).max(initial=0.0))
+    if size == 0:
         return segments
-    _, first, ends = np.unique(np.rint(segments / near).reshape(-1, 2), axis=0, return_index=True, return_inverse=True)
+    near = max(1e-12 * size, ONE_PLACE * float(np.spacing(largest)))
+    first, ends = np.unique(welded(places, near), return_inverse=True)
     ends = ends.reshape(-1, 2)
     # the corners that lie on each segment, in order along it
-    corners, (tails, heads) = segments.reshape(-1, 2)[first], ends[ends[:, 0] != ends[:, 1]].T
+    in_space, (tails, heads) = places[first], ends[ends[:, 0] != ends[:, 1]].T
+    corners = in_space[:, :2]
     start, step = corners[tails], corners[heads] - corners[tails]
-    lengths, in_space = np.linalg.norm(step, axis=1), np.pad(corners, ((0, 0), (0, 1)))
+    lengths = np.linalg.norm(step, axis=1)
     begins, touched = BoxTree.of(in_space, in_space).meeting(in_space[np.stack([tails, heads, heads], axis=1)], near)
     owners = np.repeat(np.arange(len(tails)), np.diff(begins))
     away, along = corners[touched] - start[owners], step[owners] / lengths[owners, None]
