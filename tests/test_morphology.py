@@ -313,6 +313,13 @@ def test_distances_may_vary():
     np.testing.assert_allclose(lengths, 1 + 0.2 * inwards.vertices[:, 2] / lengths, atol=3e-3)
 
 
+@pytest.mark.parametrize("distances", [lambda points: np.full(len(points), "a"), lambda points: None, lambda points: 1])
+def test_functions_return_a_number_for_each_point(distances):
+    with pytest.raises(sh.SignedHeatError) as caught:
+        sh.offset(BALL, distances, resolution=24)
+    assert caught.value.element == "distance"
+
+
 def test_offsets_do_not_depend_on_scale():
     volumes = []
     for scale in (1e-6, 1.0, 1e6):

@@ -69,6 +69,10 @@ def test_what_is_no_map_is_refused():
     for wrong in (np.eye(3), np.diag([1, 1, 0, 1]), np.diag([1, 1, 1, 2]), np.full((3, 4), np.nan)):
         with pytest.raises(sh.errors.GeometryError):
             sh.transform(ball, wrong)
+    for wrong in (ball.vertices, "ball.stl"):
+        with pytest.raises(sh.errors.UnsupportedTypeError) as caught:
+            sh.transform(wrong, np.eye(4))
+        assert ("PointCloud" if isinstance(wrong, np.ndarray) else "sh.read") in caught.value.remedy
     with refused(sh.errors.GeometryError, "points"):
         sh.transform(sh.PointCloud([[0, 0], [1, 1]]), np.eye(4))
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image as pillow
 
+import signedheat as sh
 from signedheat import samples
 from signedheat.cli import main
 from signedheat.cli import view_commands as view
@@ -63,3 +64,10 @@ def test_drawings_are_no_shapes_in_space(drawing, tmp_path, monkeypatch, capsys,
     assert main(command.format(*[drawing.name] * 2).split()) == 1
     told = capsys.readouterr().err
     assert "square.svg: a drawing is no shape in space: measure distance to its lines" in told, told
+
+
+@pytest.mark.parametrize("ending", [".svg", ".csv", ".dxf", ".geojson"])
+def test_drawings_of_every_format_are_no_shapes_in_space(ending):
+    with pytest.raises(sh.errors.FileFormatError) as caught:
+        sh.read(f"drawing{ending}")
+    assert "read_polylines" in caught.value.remedy

@@ -146,6 +146,9 @@ def test_single_precision_columns_and_levels():
     [
         (ball, [[0, 0, 0], [0, 1, 1]], {}, "lower and the upper corner"),
         (lambda points: points, CUBE, {}, "returns shape"),
+        (lambda points: np.full(len(points), "a"), CUBE, {}, "real numbers"),
+        (ball, ball, {}, "real numbers"),
+        (np.full((4, 4, 4), "a"), CUBE, {"resolution": None}, "real numbers"),
         (lambda points: np.log(points[:, 0] - 2), CUBE, {}, "not finite"),
         (np.zeros((4, 4)), CUBE, {"resolution": None}, "3 axes"),
         (np.full((4, 4, 4), np.nan), CUBE, {"resolution": None}, "finite"),

@@ -19,7 +19,7 @@ from ..surfaces.digital_surface import DigitalSurface
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..validation import chosen, public_call
-from .drawing_files import POLYLINE_FORMATS
+from .drawing_files import POLYLINE_READERS
 from .field_files import CONVENTION, read_field
 from .files import PathLike, ensure_writable, extension, format_for, reading, replacing
 from .image_files import NIFTI
@@ -134,7 +134,7 @@ def read(path: PathLike) -> Shape | Solid:
     ...     sh.read(f"{folder}/one.ply")
     TriangleMesh(3 vertices, 1 face)
     """
-    if extension(path) in POLYLINE_FORMATS:
+    if extension(path) in POLYLINE_READERS:
         raise FileFormatError(
             "a drawing is no shape in space",
             remedy="measure distance to its lines by `volume` or `offset`, in Python by `read_polylines` and "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import singledispatch
+from os import PathLike
 from typing import TypeAlias, cast
 
 import numpy as np
@@ -19,7 +20,16 @@ from ..surfaces.surface_curves import Curve, SurfacePoints
 from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..validation import LARGEST_COORDINATE, SMALLEST_EXTENT, numbers, public_call
-from .foreign import ForeignShape, Represented, SurfaceShape, as_shape, as_shapes, converted, refuse_arrays
+from .foreign import (
+    ForeignShape,
+    Represented,
+    SurfaceShape,
+    as_shape,
+    as_shapes,
+    converted,
+    refuse_arrays,
+    what_to_pass,
+)
 from .kinds import ShapeLike
 
 
@@ -82,7 +92,8 @@ def transformed(
     shape: object, linear: Floats, move: Floats
 ) -> TriangleMesh | PolygonMesh | PointCloud | TetMesh | Represented:
     """Transform a shape by ``x → linear x + move``, (3, 3) and (3,). Every type of shape registers a function."""
-    raise UnsupportedTypeError(f"a {type(shape).__name__} cannot be transformed", remedy="transform what it is made of")
+    remedy = what_to_pass(shape) if isinstance(shape, np.ndarray | str | PathLike) else "transform what it is made of"
+    raise UnsupportedTypeError(f"a {type(shape).__name__} cannot be transformed", remedy=remedy)
 
 
 @transformed.register

@@ -17,7 +17,7 @@ from ..grids.grid_discretization import refuse_large_grid
 from ..grids.marching import CAP, closed_surface
 from ..mesh.unit_vectors import unit
 from ..surfaces.triangle_mesh import TriangleMesh
-from ..validation import array_of, finite_number, flag, positive_steps, public_call, refuse_beside, whole_number
+from ..validation import finite_number, flag, numbers, positive_steps, public_call, refuse_beside, whole_number
 from .contouring import crossed_between, traced
 
 Function: TypeAlias = Callable[[Floats], ArrayLike]
@@ -219,7 +219,7 @@ def contour(
     >>> surface.bounds.round(9).tolist()
     [[-0.7, -0.7, -0.7], [0.7, 0.7, 0.7]]
     """
-    box = array_of(bounds, "bounds").astype(np.float64)
+    box = numbers(bounds, "bounds")
     if box.shape != (2, 3) or not np.isfinite(box).all() or not (box[0] < box[1]).all():
         raise GeometryError("bounds must be the lower and the upper corner of a box, (2, 3)", element="bounds")
     height, is_sharp = finite_number(level, "level"), flag(sharp, "sharp")
@@ -283,19 +283,19 @@ def _called(f: Function, points: Floats, shape: tuple[int, ...]) -> Floats:
     parts = [np.empty((0, *(shape or (1,))))]
     for begin in range(0, len(points), NODES_AT_ONCE):
         asked = points[begin : begin + NODES_AT_ONCE]
-        numbers = np.asarray(f(asked), dtype=np.float64)
-        if numbers.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
+        values = numbers(f(asked), "values of the function", SignedHeatError)
+        if values.shape not in ((len(asked), *shape), (len(asked), *(shape or (1,)))):
             raise SignedHeatError(
-                f"the function returns shape {numbers.shape} for {counted(len(asked), 'point')}",
+                f"the function returns shape {values.shape} for {counted(len(asked), 'point')}",
                 element="f",
                 remedy="return one number for each of (n, 3) points, or three numbers for a gradient",
             )
-        numbers = numbers.reshape(len(asked), -1)
-        lost = ~np.isfinite(numbers).all(axis=1)
+        values = values.reshape(len(asked), -1)
+        lost = ~np.isfinite(values).all(axis=1)
         if lost.any():
             place = ", ".join(f"{x:.4g}" for x in asked[np.argmax(lost)])
             raise SignedHeatError(f"the function is not finite at ({place})", element="f")
-        parts.append(numbers)
+        parts.append(values)
     return np.concatenate(parts)
 
 
@@ -305,7 +305,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
     `gradient` are (nx, ny, nz, 3) gradients at nodes, or a function that returns them. By default they are estimated by
     differences, and count as unknown where these change too fast.
     """
-    values = array_of(f, "f").astype(np.float64)
+    values = numbers(f, "f")
     if values.ndim != 3 or min(values.shape) < 2 or not np.isfinite(values).all():
         raise GeometryError(
             f"an array must hold finite numbers at 2 nodes or more along each of 3 axes, not {values.shape}",
@@ -322,7 +322,7 @@ def _of_array(f: ArrayLike, gradient: Function | ArrayLike | None, box: Floats, 
         if callable(gradient):
             nodes = np.indices(values.shape).reshape(3, -1).T
             gradient = _called(gradient, box[0] + nodes * steps, (3,)).reshape(*values.shape, 3)
-        slopes = array_of(gradient, "gradient").astype(np.float64)
+        slopes = numbers(gradient, "gradient")
         if slopes.shape != (*values.shape, 3) or not np.isfinite(slopes).all():
             raise GeometryError(f"gradients must be finite, of shape {(*values.shape, 3)}", element="gradient")
     planes = NodePlanes(box[0], steps, values - level, slopes, known)

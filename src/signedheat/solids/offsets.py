@@ -22,6 +22,7 @@ from ..shapes.area_elements import area_elements
 from ..shapes.foreign import as_list
 from ..shapes.kinds import Shapes
 from ..surfaces.triangle_mesh import TriangleMesh
+from ..validation import numbers
 from .mesh_orientation import agreeing_faces
 from .tiles import Evaluated
 
@@ -139,7 +140,7 @@ def checked_reach(reach: Reach) -> Reach:
 
     def called(points: Floats) -> Floats:
         """(n,) values at (n, 3) points, checked."""
-        values = np.asarray(reach(points), dtype=np.float64)
+        values = numbers(reach(points), "distance", SignedHeatError)
         if values.shape != (len(points),) or not np.isfinite(values).all():
             raise SignedHeatError(
                 f"the distance has shape {values.shape} at {counted(len(points), 'place')}, or is not finite",
