@@ -266,7 +266,8 @@ def decide(pieces: CurvePieces, every_piece: bool = False) -> Decision:
     candidates = [rivals[0].signs, smooth]
     if not every_piece:
         candidates.append(without_loose(rivals[0], movable))
-    reading = least_of(strokes, [given, *(strokes.by_heat(signs) for signs in candidates if signs.any())], TIE)
+    others = {signs.tobytes(): signs for signs in candidates if signs.any() and not (signs == given.signs).all()}
+    reading = least_of(strokes, [given, *map(strokes.by_heat, others.values())], TIE)
     if reading is given:
         return Decision(pieces, given)
     apart = [strokes.either_way(rivals[0]), *(strokes.changed_share(rival, rivals[0]) for rival in rivals)]
@@ -364,6 +365,8 @@ def smooth_signs(strokes: Strokes, movable: Bools) -> Floats:
 
     A small cost keeps given directions where the energy is about the same.
     """
+    if len(movable) == 1:  # the direction given; no system need be solved for it
+        return np.ones(1)
     agreed, given = strokes.agreed, np.where(movable, WEAK_TURNING_COST, 1e6) * strokes.lengths
     given = given / strokes.lengths.mean()
     weights = np.block([[agreed, given[:, None]], [given[None], np.zeros((1, 1))]])

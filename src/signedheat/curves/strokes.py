@@ -18,7 +18,6 @@ from ..arrays import Bools, Floats, Ints
 from ..compiled import compiled
 from ..constraints import ZeroSet
 from ..errors import CancellingNormalsError
-from ..geodesics.exact_distance import shortest_arcs
 from ..geodesics.geodesic_sources import PlacedSegments, nearest_shares
 from ..linear import factorize
 from ..mesh.components import grouped, members_of, sums_of
@@ -520,17 +519,16 @@ def widened(triangles: IntrinsicMesh, seen: sparse.csr_matrix, width: float) -> 
     """
     n = triangles.n_vertices
     tails, heads = triangles.edges.vertices.T
-    both_ways = np.concatenate([tails, heads]), np.concatenate([heads, tails])
-    neighbors = shortest_arcs(*both_ways, np.tile(triangles.lengths_of_edges, 2), n)
+    starts, arcs = grouped(np.concatenate([tails, heads]), n)
+    ends, lengths = np.concatenate([heads, tails]), np.tile(triangles.lengths_of_edges, 2)
     pairs = sparse.coo_matrix(seen)
     known = np.sort(pairs.row.astype(np.int64) * n + pairs.col)
     off = pairs.data != 2
     stroke, vertex, side = pairs.row[off].astype(np.int64), pairs.col[off], pairs.data[off] - 2
     far, chosen = np.zeros(len(stroke)), [(stroke, vertex, side)]
     while len(stroke):
-        origins, links = members_of(neighbors.indptr, np.arange(neighbors.nnz), vertex)
-        stroke, vertex, side = stroke[origins], neighbors.indices[links].astype(np.int64), side[origins]
-        far = far[origins] + neighbors.data[links]
+        origins, links = members_of(starts, arcs, vertex)
+        stroke, vertex, side, far = stroke[origins], ends[links], side[origins], far[origins] + lengths[links]
         keys = stroke * n + vertex
         near = (far <= width) & ~np.isin(keys, known)
         order = np.flatnonzero(near)[np.lexsort((far[near], keys[near]))]
