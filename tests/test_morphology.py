@@ -354,3 +354,15 @@ def test_walls_have_no_sealed_crumbs(keep):
     assert sh.offset(head, -0.2, resolution=72).to_trimesh().body_count == 2
     wall = sh.morphology.shell(head, -0.2, 0.0, resolution=72, keep_outside=keep)
     assert wall.to_trimesh().body_count == 2
+
+
+@pytest.mark.parametrize(("inner", "outer"), [(-0.2, 0.0), (-0.25, -0.05)])
+@pytest.mark.parametrize("resolution", [40, 64])
+def test_walls_of_shells_have_edges(inner, outer, resolution):
+    """The wall between two boxes is as sharp as both, also where it is hardly thicker than a cell."""
+    wall = sh.morphology.shell(box((0.0, 0.0, 0.0), (2.0, 3.0, 4.0)), inner, outer, resolution=resolution)
+    assert_closed_manifold(wall)
+    assert not len(self_intersections(wall.vertices, wall.faces))
+    sizes = np.array([2.0, 3.0, 4.0])
+    exact = np.prod(sizes + 2 * outer) - np.prod(sizes + 2 * inner)
+    assert enclosed_volume(wall) == pytest.approx(exact, rel=1e-3)

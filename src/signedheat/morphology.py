@@ -7,6 +7,7 @@ distance to the shape by a constant on one side only.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
@@ -522,18 +523,15 @@ def shell(
             raise SourceError(
                 "`measure` returned no distance to a solid with faces", remedy="leave out measure or keep_outside"
             )
-        wall = solid.surface()
-        try:
-            inside = solid.surface(inner, spacing=grid.spacing)
-        except OutsideError:
-            _warn_not_hollow(inner)
-        else:
-            both = [(wall.vertices, wall.faces), (inside.vertices, inside.faces[:, ::-1])]
-            wall = TriangleMesh(*concatenated(both))
+        wall, level = solid.surface(), cast("Callable[[float], object]", partial(solid.surface, spacing=grid.spacing))
     else:
-        if not (field.values < inner).any():
-            _warn_not_hollow(inner)
-        wall = Field(grid, np.maximum(inner - field.values, field.values - outer)).offset(0.0)
+        wall, level = cast("TriangleMesh", field.offset(outer)), field.offset
+    try:
+        inside = cast("TriangleMesh", level(inner))
+    except OutsideError:
+        _warn_not_hollow(inner)
+    else:
+        wall = TriangleMesh(*concatenated([(wall.vertices, wall.faces), (inside.vertices, inside.faces[:, ::-1])]))
     wall = _without_crumbs(wall, outer - inner)
     return wall if hole is None else _with_drain_hole(wall, hole, float(grid.spacing.max()))
 
