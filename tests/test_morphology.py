@@ -366,3 +366,15 @@ def test_walls_of_shells_have_edges(inner, outer, resolution):
     sizes = np.array([2.0, 3.0, 4.0])
     exact = np.prod(sizes + 2 * outer) - np.prod(sizes + 2 * inner)
     assert enclosed_volume(wall) == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_shell_that_the_grid_cuts_is_closed_there():
+    """Of a box that reaches below the grid only the upper half is made, and its wall is closed at the bottom."""
+    grid = sh.Grid((-0.5, -0.5, 2.0), 0.1, (31, 41, 31))
+    wall = sh.morphology.shell(box((0.0, 0.0, 0.0), (2.0, 3.0, 4.0)), -0.3, 0.0, grid)
+    assert_closed_manifold(wall)
+    outward = wall.face_area_vectors[:, 2] / wall.face_areas
+    middles = wall.vertices[wall.faces].mean(axis=1)
+    bottom = (outward < -0.99) & (middles[:, 2] < 2.1)
+    assert wall.face_areas[bottom].sum() == pytest.approx(2.0 * 3.0 - 1.4 * 2.4, rel=0.05)
+    assert not (np.abs(middles[bottom, :2] - [1.0, 1.5]) < [0.6, 1.1]).all(axis=1).any()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Literal, Protocol, TypeAlias, cast, overload
+from typing import Any, Literal, Protocol, TypeAlias, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -513,25 +513,16 @@ def shell(
     grid = _grid(_given_or_room(domain, shape, max(abs(inner), abs(outer)), resolution))
     _refuse_thin(grid, outer - inner)
     callback(measure, "measure(shape, domain)")
-    if keep_outside and measure is None:
-        solid: object = complete(shape)
-    else:
-        field = (measure or signed_distance)(shape, grid)
-        solid = field.solid
-    if keep_outside:
+    field = None if keep_outside and measure is None else (measure or signed_distance)(shape, grid)
+    if field is None or keep_outside:
+        solid: object = complete(shape) if field is None else field.solid
         if not isinstance(solid, Solid):
             raise SourceError(
                 "`measure` returned no distance to a solid with faces", remedy="leave out measure or keep_outside"
             )
-        wall, level = solid.surface(), cast("Callable[[float], object]", partial(solid.surface, spacing=grid.spacing))
+        wall = _hollowed(solid.surface(), partial(solid.surface, spacing=grid.spacing), inner)
     else:
-        wall, level = cast("TriangleMesh", field.offset(outer)), field.offset
-    try:
-        inside = cast("TriangleMesh", level(inner))
-    except OutsideError:
-        _warn_not_hollow(inner)
-    else:
-        wall = TriangleMesh(*concatenated([(wall.vertices, wall.faces), (inside.vertices, inside.faces[:, ::-1])]))
+        wall = _between_levels(grid, field, inner, outer)
     wall = _without_crumbs(wall, outer - inner)
     return wall if hole is None else _with_drain_hole(wall, hole, float(grid.spacing.max()))
 
@@ -666,6 +657,29 @@ def _linear(shape: Shapes, values: Floats) -> Reach:
         return (weights_in(vertices[ids], nearest.places) * values[ids]).sum(axis=1)
 
     return interpolated
+
+
+def _between_levels(grid: Grid, field: Field[Any], inner: float, outer: float) -> TriangleMesh:
+    """Return the surface of what lies between two level sets of a field on a grid, closed where the grid cuts it."""
+    values = field.values
+    if (grid._values_at_walls(values) < 0.0).any():  # the grid cuts the shape: a contour ends at its walls
+        if not (values < inner).any():
+            _warn_not_hollow(inner)
+        return Field(grid, np.maximum(inner - values, values - outer)).offset(0.0)
+    return _hollowed(cast("TriangleMesh", field.offset(outer)), field.offset, inner)
+
+
+def _hollowed(wall: TriangleMesh, level: Callable[[float], object], inner: float) -> TriangleMesh:
+    """Return a closed surface with the one at the distance `inner` in it as a cavity, or warn if there is none.
+
+    ``level(inner)`` returns the surface at that distance, and raises `OutsideError` if nothing is that deep.
+    """
+    try:
+        inside = cast("TriangleMesh", level(inner))
+    except OutsideError:
+        _warn_not_hollow(inner)
+        return wall
+    return TriangleMesh(*concatenated([(wall.vertices, wall.faces), (inside.vertices, inside.faces[:, ::-1])]))
 
 
 def _warn_not_hollow(inner: float) -> None:
