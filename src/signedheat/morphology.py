@@ -665,8 +665,8 @@ def _between_levels(grid: Grid, field: Field[Any], inner: float, outer: float) -
     if (grid._values_at_walls(values) < 0.0).any():  # the grid cuts the shape: a contour ends at its walls
         if not (values < inner).any():
             _warn_not_hollow(inner)
-        return Field(grid, np.maximum(inner - values, values - outer)).offset(0.0)
-    return _hollowed(cast("TriangleMesh", field.offset(outer)), field.offset, inner)
+        return cast("TriangleMesh", Field(grid, np.maximum(inner - values, values - outer)).offset(0.0))
+    return _hollowed(field.offset(outer), field.offset, inner)
 
 
 def _hollowed(wall: TriangleMesh, level: Callable[[float], object], inner: float) -> TriangleMesh:
