@@ -104,6 +104,17 @@ def test_a_closed_body_given_twice_is_one_body(move):
     assert volume(twice) == pytest.approx(1.4, rel=10 * move + 1e-9)
 
 
+@pytest.mark.parametrize("noise", [1e-12, 1e-10, 1e-9, 1e-8])
+def test_triangles_that_only_rounding_separates_are_not_divided_along_each_other(noise):
+    """Sides of a slender box in pieces of four coplanar triangles each, every piece with vertices of its own."""
+    vertices, faces = box((0, 0, 0), (4, 1, 0.1))
+    apart = vertices[faces].reshape(-1, 3)
+    apart = apart + noise * np.random.default_rng(0).normal(size=apart.shape)
+    solid = sh.complete(finer(apart, np.arange(len(apart)).reshape(-1, 3)))
+    assert len(solid.triangles) == 48 and (solid.origins >= 0).all()
+    assert solid.volume == pytest.approx(0.4, rel=40 * noise)
+
+
 @pytest.mark.parametrize("gap", [0.002, 0.01, 0.04])
 def test_panels_with_gaps_between_them_are_the_body(gap):
     """Octants of an ellipsoid, moved apart; each has the vertices of its own."""

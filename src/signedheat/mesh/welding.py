@@ -72,6 +72,13 @@ def tolerances(points: Floats, faces: Ints, units: float) -> Floats:
     return np.maximum(units * sizes[labels[faces[:, 0]]], last_places)
 
 
+def joined_faces(points: Floats, faces: Ints) -> Ints:
+    """Return (m, 3) faces between vertices that are one where they coincide, exactly or, on rims and copies, nearly."""
+    faces = same_positions(points)[faces]
+    faces = joined_copies(points, faces)[faces]
+    return joined_rims(points, faces.ravel(), np.roll(faces, -1, axis=1).ravel(), ONE_PLACE)[faces]
+
+
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:
     """Weld boundary vertices that coincide, as along seams.
 

@@ -17,7 +17,7 @@ from ..mesh.components import connected_components, element_components, next_in_
 from ..mesh.edges import EdgeTable, FaceOrientation, edge_table, orient_faces, pair_halfedges
 from ..mesh.triangles import area_vectors, face_areas, part_volumes
 from ..mesh.unit_vectors import ANGLE_ROUNDING, angles_around, unit
-from ..mesh.welding import ONE_PLACE, coincident_faces, joined_copies, joined_rims, same_positions
+from ..mesh.welding import coincident_faces, joined_faces
 from ..surfaces.triangle_mesh import TriangleMesh
 
 EQUAL_AREAS = 1e-9
@@ -40,10 +40,7 @@ class Chain(Frozen):
     @classmethod
     def of(cls, mesh: TriangleMesh) -> Chain:
         """Make the chain of a mesh."""
-        faces = same_positions(mesh.vertices)[mesh.faces]
-        faces = joined_copies(mesh.vertices, faces)[faces]
-        joined = joined_rims(mesh.vertices, faces.ravel(), np.roll(faces, -1, axis=1).ravel(), ONE_PLACE)
-        ids = joined[faces]
+        ids = joined_faces(mesh.vertices, mesh.faces)
         first, backwards = coincident_faces(ids.ravel(), np.arange(0, 3 * len(ids) + 1, 3))
         distinct = np.flatnonzero(first == np.arange(len(ids)))
         numbers = np.full(len(ids) + 1, -1)

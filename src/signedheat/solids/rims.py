@@ -14,7 +14,7 @@ from ..mesh.components import grouped, next_in_groups, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors, corner_normals
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
-from ..mesh.welding import same_positions, tolerances
+from ..mesh.welding import joined_faces, tolerances
 from ..parallel import PointTree
 from ..surfaces.triangle_mesh import TriangleMesh
 
@@ -229,7 +229,7 @@ def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
 
     Return the divided mesh of m faces, and the (m,) faces of `mesh` that they are parts of.
     """
-    points, faces = mesh.vertices, same_positions(mesh.vertices)[mesh.faces]
+    points, faces = mesh.vertices, joined_faces(mesh.vertices, mesh.faces)
     table = edge_table(faces)
     loose = (table.face_counts[table.face_edges] == 1).all(axis=1)  # loose triangles end nowhere
     in_surface = np.zeros(len(table.vertices), dtype=bool)
