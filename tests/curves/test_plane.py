@@ -299,6 +299,62 @@ def test_outlines_that_share_lines_are_filled_by_turns(angle):
     np.testing.assert_array_equal((field.values < 0)[clear], inside[clear])
 
 
+def circle(x, y, radius, begin=0.0, gone=0.0, n=200):
+    """A circle without a share of it after an angle, as an open line that ends where it begins if nothing is gone."""
+    angles = begin + 2 * np.pi * np.linspace(gone, 1.0, n)
+    return np.stack([x + radius * np.cos(angles), y + radius * np.sin(angles)], axis=1)
+
+
+@pytest.mark.parametrize("gone", [0.0, 1e-9, 1e-3, 0.01, 0.025])
+@pytest.mark.parametrize("way", [1, -1])
+def test_rings_with_narrow_gaps_are_outlines_whatever_they_meet(gone, way):
+    """Rings that cross, that begin at a common point, and that are drawn twice; their gaps are closed straight."""
+    points = np.random.default_rng(0).uniform(-2.2, 2.2, (2000, 2))
+    scenes = {
+        "cross": [(-0.5, 0.1, 1.0), (0.5, 0, 0.9)],
+        "begin together": [(-1.0, 0, 1.0), (1.0, 0, 1.0, np.pi)],
+        "twice": [(0, 0, 1.0), (0, 1e-9, 1.0)],
+    }
+    for rings in scenes.values():
+        lines = [circle(*ring, gone=gone)[:: way if k == 1 else 1] for k, ring in enumerate(rings)]
+        away = [np.linalg.norm(points - ring[:2], axis=1) - ring[2] for ring in rings]
+        inside = (away[0] < 0) | (away[1] < 0)
+        field = sh.signed_distance([sh.Polyline(line) for line in lines], resolution=16)
+        clear = np.min(np.abs(away), axis=0) > np.pi**2 * gone**2 / 2 + 2e-3  # the sagitta of the gap, and of segments
+        found = field.closest(points)
+        np.testing.assert_array_equal((found.distances < 0)[clear], inside[clear])
+        assert (found.faces < 0).mean() <= 2 * gone + 0.01 and ((found.faces < 0).any() or gone < 0.01)
+
+
+def test_distance_across_a_gap_is_to_its_straight_line():
+    field = sh.signed_distance(sh.Polyline(circle(0, 0, 1, gone=0.02)), resolution=16)
+    found = field.closest(np.array([[0.5, 0.5 * np.tan(0.02 * np.pi)], [-0.5, 0.0]]))
+    expected = np.cos(0.02 * np.pi) - 0.5 / np.cos(0.02 * np.pi)
+    np.testing.assert_allclose(found.distances, [-expected, -0.5], atol=2e-4)
+    assert found.faces[0] == -1 and found.confidence[0] == 0 and found.faces[1] >= 0 and found.confidence[1] == 1
+
+
+@pytest.mark.parametrize("ways", [(1, 1, 1), (1, -1, 1), (-1, -1, -1)])
+def test_lines_that_join_and_nearly_close_are_an_outline(ways):
+    """Three sides of a box, beside a whole one whose sides are lines of their own."""
+    whole = sides(0.0)
+    box = [side if way > 0 else side.reversed() for side, way in zip(sides(0.0)[:3], ways, strict=True)]
+    lines = [*whole, *(sh.Polyline(side.points * [0.5, 1.0] + [3, 0]) for side in box)]
+    field = sh.signed_distance(lines, resolution=48)
+    assert field([[0, 0], [3, 0]]).max() < -0.4 and field([[1.5, 0], [-1.5, 0], [4.5, 0], [3, 1.5]]).min() > 0.3
+
+
+def test_a_bow_in_strokes_is_a_guess():
+    """Its loops run against each other, and strokes that overlap show no outline."""
+    angles = 2 * np.pi * np.linspace(0, 1, 200)
+    bow = np.stack([np.sin(angles), 0.6 * np.sin(2 * angles)], axis=1)
+    for n in (6, 8):
+        starts = np.arange(n) * 199 // n
+        strokes = [bow[(k + np.arange(220 // n + 10)) % 199] for k in starts]
+        with pytest.warns(InexactWarning, match="guess"):
+            sh.signed_distance([sh.Polyline(stroke) for stroke in strokes], resolution=48)
+
+
 def test_a_tie_is_announced_and_decided_alike_however_it_is_given():
     """Two halves of a circle that face each other: one of them is turned."""
     angles = 2 * np.pi * np.arange(19) / 40

@@ -22,6 +22,7 @@ from ..grids.polyline import Polyline
 from ..jobs import Stopwatch, bound_progress, part_of_work, run_cancellable
 from ..mesh.components import sums_of
 from ..mesh.polylines import FillRule, without_seams
+from ..mesh.triangles import AREA_ROUNDING
 from ..mesh.unit_vectors import unit
 from ..mesh.welding import ONE_PLACE
 from ..search.face_tree import EQUALLY_NEAR, FaceTree
@@ -35,12 +36,16 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import SMALLEST_EXTENT, flag, query_points, shaped
 from .curve_distance import CurvesTaken, distance_to_pieces
 from .gaps import Gaps
-from .outlines import outlines_filled
+from .outlines import chains, outlines_filled
 from .resolution import on_resolving_triangles
 
 FINEST_DRAWING = 1024
 """Largest number of cells along a drawing with which it is completed, however fine the grid is. Three broken drawings
 differ by 0.010 of their radius between 128 and 512 cells, by 0.007 between 128 and 256."""
+NARROW_GAP = 1 / 32
+"""Width of a gap, relative to the length of the outline or of the shorter line at it, up to which it is closed straight
+and the outline is filled. Of gaps in circles and in stars, straight lines are nearer to what is gone than heat is up to
+1/16 of the length: 2 to 30 times up to 1/64, and about as near from 1/32."""
 STROKE_NODES = 96
 """Number of nodes along the longest side of the triangle mesh on which strokes are oriented. Of 150 drawings none is
 wrong without a warning and 7 are right with one; halved 0 and 5, doubled 0 and 6."""
@@ -85,15 +90,16 @@ def distance_to_lines(
     if domain.dimension != 2:
         return SignedHeatSolver(domain, diffusion, bound_progress()).distance(listed, constraint)
     notes: list[Note] = []
+    across = np.empty((0, 2, 2))
     is_drawing = not as_oriented and all(isinstance(line, Polyline) for line in listed)
     if is_drawing:
-        listed, numbers, filled = outlines_filled(listed, fill, 1 / FINEST_DRAWING)
+        listed, numbers, filled, across = outlines_filled(listed, fill, NARROW_GAP)
         notes += [filled] if filled else []
         if filled and all(line.closed for line in listed):
-            drawing = Drawing(without_seams(segments_of_lines(listed)))
+            drawing = Drawing(*apart_from(without_seams(segments_of_lines(listed)), across))
             return _field_of(drawing, domain, Diagnostics(notes=tuple(notes)))
         with part_of_work(0.0, 0.4):
-            listed, taken = strokes_that_agree(as_outlines(listed), numbers, every_piece)
+            listed, taken, doubt = strokes_that_agree(as_outlines(listed), numbers, every_piece)
         notes += [taken] if taken else []
     solver = SignedHeatSolver(_grid_around(listed, domain), diffusion, bound_progress())
     with part_of_work(0.4, 0.8):
@@ -104,9 +110,17 @@ def distance_to_lines(
             with part_of_work(0.4, 0.8):
                 phi = cast("Field[Grid[Literal[2]]]", solver.distance([*listed, *closing], constraint))
         beyond = values_at_walls(phi.values) < 0
+        if closing and beyond.any() and not beyond.all() and not doubt:
+            doubt = (
+                "lines that nearly close bound nothing, since some of them run against the others: which side is "
+                "which is a guess. Draw what is missing, or flip lines that run the wrong way"
+            )
+        if doubt:
+            warn_user(doubt, InexactWarning)
         if beyond.all() or (closing and beyond.mean() > 0.5):  # what is bounded is inside, whichever way it runs
             listed, phi = [line.reversed() for line in listed], phi.with_values(-phi.values)
-    drawing = Drawing.completed(segments_of_lines([line for line in listed if isinstance(line, Polyline)]), phi)
+    segments = segments_of_lines([line for line in listed if isinstance(line, Polyline)])
+    drawing = Drawing.completed(*apart_from(segments, across), phi)
     diagnostics = replace(phi.diagnostics, notes=(*phi.diagnostics.notes, *notes))
     return _field_of(drawing, domain, diagnostics)
 
@@ -144,25 +158,30 @@ def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics) -> Field[G
 
 
 def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
-    """Orient open lines that nearly close as outlines, by the number of other outlines that enclose each of them.
+    """Orient open lines that nearly close together as outlines, by the number of other outlines that enclose each.
 
-    Inside an even number of others a line bounds a filled region, inside an odd number a hole. Lines that are closed or
-    do not nearly close are returned as they are.
+    Inside an even number of others a chain of lines bounds a filled region, inside an odd number a hole. Lines that are
+    closed, or in chains that do not nearly close, are returned as they are.
     """
-    gaps = [np.linalg.norm(line.points[-1] - line.points[0]) for line in lines]
-    nearly = [k for k, line in enumerate(lines) if not line.closed and gaps[k] < NEARLY_CLOSED * line.length]
+    joined = chains({k: line for k, line in enumerate(lines) if not line.closed}, 1 / FINEST_DRAWING)
+    nearly = [
+        chain
+        for chain in joined
+        if chain.gaps[-1] < NEARLY_CLOSED * (chain.outline.length - chain.gaps[-1])
+        and chain.encloses(float(chain.gaps[:-1].max(initial=0.0)))
+    ]
     if not nearly:
         return list(lines)
-    closed = [Polyline(lines[k].points, closed=True) for k in nearly]
-    begins = np.array([line.points[0] for line in closed])
+    begins = np.array([chain.outline.points[0] for chain in nearly])
     depths = _enclosed(segments_of_lines([line for line in lines if line.closed]), begins).astype(np.int64)
-    for number, line in enumerate(closed):
-        within = _enclosed(line.segments, begins)
+    for number, chain in enumerate(nearly):
+        within = _enclosed(chain.outline.segments, begins)
         within[number] = False
         depths += within
     result = list(lines)
-    for k, line, depth in zip(nearly, closed, depths.tolist(), strict=True):
-        if (line.signed_area > 0) == (depth % 2 == 0):
+    for chain, depth in zip(nearly, depths.tolist(), strict=True):
+        turns = (chain.outline.signed_area > 0) == (depth % 2 == 0)
+        for k in np.array(chain.members)[chain.backwards != turns].tolist():
             result[k] = result[k].reversed()
     return result
 
@@ -200,14 +219,14 @@ def _grid_around(sources: Sequence[Any], asked: Grid) -> Grid:
 
 def strokes_that_agree(
     lines: Sequence[Polyline], numbers: Sequence[int], every_piece: bool
-) -> tuple[list[Polyline], CurvesTaken | None]:
+) -> tuple[list[Polyline], CurvesTaken | None, str]:
     """Flip strokes so that they bound something together, and leave out those that do not.
 
     `distance_to_pieces` decides that on a triangle mesh of a rectangle around the lines. Also returns its note, None if
-    all lines are used as given. Warnings and the note name the lines by `numbers`.
+    all lines are used as given, and its warning, "" if the result is no guess. Both name the lines by `numbers`.
     """
     if all(line.closed for line in lines):
-        return list(lines), None
+        return list(lines), None, ""
     bounds = bounds_around(lines)
     size = float(np.ptp(bounds, axis=0).max())
     sheet = _triangles_around((bounds - bounds[0]) / size)
@@ -217,14 +236,12 @@ def strokes_that_agree(
         SignedHeatSolver(sheet, 1.0),
         curves,
     )
-    if doubt:
-        warn_user(doubt, InexactWarning)
     note = field.diagnostics.note(CurvesTaken)
     if note is None:
-        return list(lines), None
+        return list(lines), None, doubt
     turned, left_out = set(note.turned), set(note.left_out)
     used = [(k, line) for k, line in zip(numbers, lines, strict=True) if k not in left_out]
-    return [line.reversed() if k in turned else line for k, line in used], note
+    return [line.reversed() if k in turned else line for k, line in used], note, doubt
 
 
 def _triangles_around(bounds: Floats) -> TriangleMesh:
@@ -238,6 +255,15 @@ def _triangles_around(bounds: Floats) -> TriangleMesh:
     return TriangleMesh(np.pad(nodes.points.reshape(-1, 2), ((0, 0), (0, 1))), np.hstack([first, second]).T)
 
 
+def apart_from(segments: Floats, closing: Floats) -> tuple[Floats, Floats]:
+    """Divide (m, 2, 2) segments into those that were given, and those that run along (k, 2, 2) `closing` ones."""
+    if not len(closing):
+        return segments, closing
+    rounding = AREA_ROUNDING * float(np.ptp(segments.reshape(-1, 2), axis=0).max())
+    runs_along = tree_of(closing).distances(_in_space(segments.mean(axis=1))) <= rounding
+    return segments[~runs_along], segments[runs_along]
+
+
 def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
     """Return the ends of all segments of lines in the plane, line after line, as (m, 2, 2) coordinates."""
     return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
@@ -248,21 +274,25 @@ class Drawing(Frozen):
     """Segments in the plane to which signed distance can be measured exactly at any point."""
 
     lines: Floats  # (m, 2, 2) ends of the given segments; distance is positive to their left
-    # (k, 2, 2) ends of the segments that close gaps
+    # (k, 2, 2) ends of the segments that close gaps; with the lines, they form closed outlines if there is no φ
     completion: Floats = field(default_factory=lambda: np.empty((0, 2, 2)))
-    # its sign decides the side farther than `SIDE_CELLS` from lines. Without it, lines are closed outlines
+    # its sign decides the side farther than `SIDE_CELLS` from lines. Without it, the number of outlines around does
     phi: Field[Grid[Literal[2]]] | None = None
     has_sides: bool = True  # whether distance is negative on one side of lines
 
     @classmethod
-    def completed(cls, lines: Floats, phi: Field[Grid[Literal[2]]]) -> Drawing:
-        """Make a drawing of (m, 2, 2) segments and of the parts of the zero set of φ that are far from them."""
+    def completed(cls, lines: Floats, across: Floats, phi: Field[Grid[Literal[2]]]) -> Drawing:
+        """Make a drawing of (m, 2, 2) segments, completed by those `across` gaps, (k, 2, 2), and by the zero set of φ.
+
+        Of the zero set, the parts that are far from all of these count.
+        """
         crosses = bool((phi.values < 0).any() and (phi.values >= 0).any())
         zero_set = segments_of_lines(phi.contour()) if crosses else np.empty((0, 2, 2))
-        if len(lines) and len(zero_set):
-            away = tree_of(lines).distances(_in_space(zero_set.mean(axis=1)))
+        known = np.concatenate([lines, across])
+        if len(known) and len(zero_set):
+            away = tree_of(known).distances(_in_space(zero_set.mean(axis=1)))
             zero_set = zero_set[away > SIDE_CELLS * float(phi.domain.spacing.max())]
-        return cls(lines, zero_set, phi)
+        return cls(lines, np.concatenate([across, zero_set]), phi)
 
     @property
     def triangles(self) -> Floats:
@@ -280,14 +310,14 @@ class Drawing(Frozen):
 
     @cached_property
     def _corners(self) -> tuple[Ints, Floats, Ints, Floats]:
-        """Return the c distinct ends of lines, called corners, and what meets there.
+        """Return the c distinct ends of segments, called corners, and what meets there.
 
-        These are (m, 2) the corner at both ends of each segment, (c, 2) the sum of the unit normals of the segments at
-        each corner, (c,) the number of these segments, and (c,) the length of the shortest of them.
+        These are (m + k, 2) the corner at both ends of each segment, (c, 2) the sum of the unit normals of the segments
+        at each corner, (c,) the number of these segments, and (c,) the length of the shortest of them.
         """
-        along = self.lines[:, 1] - self.lines[:, 0]
+        along = self._segments[:, 1] - self._segments[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
-        corners, places = np.unique(self.lines.reshape(-1, 2), axis=0, return_inverse=True)
+        corners, places = np.unique(self._segments.reshape(-1, 2), axis=0, return_inverse=True)
         shortest = np.full(len(corners), np.inf)
         np.minimum.at(shortest, places.ravel(), np.repeat(np.linalg.norm(along, axis=1), 2))
         return (
@@ -336,9 +366,10 @@ class Drawing(Frozen):
         nearest, places = self._tree.features.ids[found.faces], found.places[:, :2]
         if not self.has_sides:
             return found.distances, places, nearest
-        on_line = nearest < len(self.lines)
+        on_line = np.ones(len(points), dtype=bool)
         sides = np.ones(len(points)) if self.phi is None else np.where(self.phi.interpolate(points) < 0, -1.0, 1.0)
         if self.phi is not None:
+            on_line = nearest < len(self.lines)
             on_line &= found.distances < SIDE_CELLS * float(self.phi.domain.spacing.max())
         sides[on_line] = self._sides(points[on_line], places[on_line], nearest[on_line])
         return sides * found.distances, places, nearest
@@ -351,13 +382,13 @@ class Drawing(Frozen):
         the number of outlines around the point decides.
         """
         corners, sums, counts, shortest = self._corners
-        ends = self.lines[nearest]
+        ends = self._segments[nearest]
         along = ends[:, 1] - ends[:, 0]
         normals = unit(np.stack([-along[:, 1], along[:, 0]], axis=1))
         crowded = np.zeros(len(points), dtype=bool)
         away = np.linalg.norm(points - places, axis=1)
         # of the ends of a segment that is not longer than this, rounding decides which is nearer
-        least = EQUALLY_NEAR * away + ONE_PLACE * np.spacing(np.abs(self.lines).max(initial=0.0))
+        least = EQUALLY_NEAR * away + ONE_PLACE * np.spacing(np.abs(self._segments).max(initial=0.0))
         reach = np.maximum(1e-9 * np.linalg.norm(along, axis=1), least)
         for end in range(2):
             is_end = np.linalg.norm(places - ends[:, end], axis=1) <= reach
@@ -368,7 +399,7 @@ class Drawing(Frozen):
         sides = np.where(heights < 0, -1.0, 1.0)
         crowded |= np.abs(heights) <= LEAST_SLOPE * away
         if self.phi is None and crowded.any():  # outlines touch, normals cancel at spikes, or corners are near
-            sides[crowded] = np.where(_enclosed(self.lines, points[crowded]), -1.0, 1.0)
+            sides[crowded] = np.where(_enclosed(self._segments, points[crowded]), -1.0, 1.0)
         return sides
 
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 import scipy
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Note
 from ..grids.polyline import Polyline
 from ..mesh.polylines import FillRule, assemble_polylines, filled_outlines
@@ -35,26 +35,29 @@ class OutlinesFilled(Note):
 
 def outlines_filled(
     lines: Sequence[Polyline], rule: FillRule, narrow: float
-) -> tuple[list[Polyline], list[int], OutlinesFilled | None]:
+) -> tuple[list[Polyline], list[int], OutlinesFilled | None, Floats]:
     """Replace closed lines by the outlines of the region that they fill; return these first, then the open lines.
 
     Open lines that close together (`closed_together`) count as a closed line; `narrow` is passed on. The second result
     has a number for each line, for messages: open lines keep theirs, and outlines get those of closed lines, or higher
-    ones if there are more outlines. The third is a note, None if no outline is filled.
+    ones if there are more outlines. The third is a note, None if no outline is filled. The last are the straight
+    segments that closed gaps wider than rounding, (k, 2, 2).
     """
     outlines = {k: line for k, line in enumerate(lines) if line.closed}
     strokes = distinct({k: line for k, line in enumerate(lines) if not line.closed})
-    for members, outline in closed_together(strokes, narrow):
-        outlines[min(members)] = outline
-        strokes = {k: line for k, line in strokes.items() if k not in members}
+    closing = [np.empty((0, 2, 2))]
+    for chain in closed_together(strokes, narrow):
+        outlines[min(chain.members)] = chain.outline
+        closing.append(chain.closing[chain.gaps > AREA_ROUNDING * chain.outline.length])
+        strokes = {k: line for k, line in strokes.items() if k not in chain.members}
     numbers = sorted(outlines)
     filled = [Polyline(points, closed=True) for points in filled_outlines([outlines[k].points for k in numbers], rule)]
     if not filled:
-        return list(lines), list(range(len(lines))), None
+        return list(lines), list(range(len(lines))), None, closing[0]
     given, left = sum(line.length for line in outlines.values()), sum(line.length for line in filled)
     note = OutlinesFilled(rule, len(outlines), max(0.0, 1.0 - left / given))
     numbers = [*numbers, *range(len(lines), len(lines) + len(filled))][: len(filled)]
-    return [*filled, *strokes.values()], [*numbers, *strokes], note
+    return [*filled, *strokes.values()], [*numbers, *strokes], note, np.concatenate(closing)
 
 
 def distinct(strokes: dict[int, Polyline]) -> dict[int, Polyline]:
@@ -65,13 +68,45 @@ def distinct(strokes: dict[int, Polyline]) -> dict[int, Polyline]:
     return {k: strokes[k] for k in sorted(first.values())}
 
 
-def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[tuple[list[int], Polyline]]:
-    """Join open lines end to end, whatever their directions, and return the closed outlines with their lines' numbers.
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Open lines that join end to end, whatever their directions."""
+
+    members: list[int]  # the k numbers of the lines, in order
+    backwards: Bools  # (k,) whether each line runs against the outline
+    outline: Polyline  # the lines, closed by a straight segment; it runs as most of their length does
+    closing: Floats  # (k, 2, 2) the segment from the end of each line to the beginning of the next
+
+    @property
+    def gaps(self) -> Floats:
+        """Lengths of the k gaps; the last is that from the end of the chain to its beginning."""
+        return np.linalg.norm(self.closing[:, 1] - self.closing[:, 0], axis=1)
+
+    def encloses(self, width: float) -> bool:
+        """Whether the outline encloses more than a line drawn there and back does, that far apart."""
+        filled = filled_outlines([self.outline.points], "nonzero")
+        area = sum(abs(Polyline(points, closed=True).signed_area) for points in filled)
+        return area > self.outline.length * max(width, AREA_ROUNDING * self.outline.length)
+
+
+def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
+    """Join open lines to `chains`, and return those whose ends are at most `narrow` times their length apart.
+
+    Those that enclose no more than a line drawn there and back, with gaps as wide as theirs, are left out.
+    """
+    return [
+        chain
+        for chain in chains(strokes, narrow)
+        if chain.gaps[-1] <= narrow * chain.outline.length and chain.encloses(float(chain.gaps.max()))
+    ]
+
+
+def chains(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
+    """Join open lines, keyed by number, end to end; every line is in one chain.
 
     Two lines join if no third line ends there and the distance between their ends is due to rounding or below `narrow`
-    times the length of the shorter line. An outline gets the direction of most of its length, or runs counter-clockwise
-    if half of it has either direction. Outlines that are not wider than the gaps in them are left out, since these are
-    lines drawn twice.
+    times the length of the shorter line. A chain gets the direction of most of its length, or runs counter-clockwise
+    if half of it has either direction.
     """
     numbers, lines = list(strokes), list(strokes.values())
     if not lines:
@@ -79,28 +114,24 @@ def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[tuple[l
     ends = np.concatenate([line.points[[0, -1]] for line in lines])
     lengths = np.repeat([line.length for line in lines], 2)
     rounding = ONE_PLACE * np.spacing(np.abs(ends).max(axis=1))
-    partner, gaps = partners(ends, np.maximum(rounding, narrow * lengths))
+    partner = partners(ends, np.maximum(rounding, narrow * lengths))
     node = np.minimum(np.arange(len(ends)), partner)
-    outlines = []
-    for chain, backwards, closed in assemble_polylines(node[::2], node[1::2], directed=False):
-        if not closed:
-            continue
-        parts = [lines[k].points[:: -1 if back else 1] for k, back in zip(chain, backwards, strict=True)]
-        widest = float(gaps[np.concatenate([2 * chain, 2 * chain + 1])].max())
+    found = []
+    for order, backwards, _ in assemble_polylines(node[::2], node[1::2], directed=False):
+        parts = [lines[k].points[:: -1 if back else 1] for k, back in zip(order, backwards, strict=True)]
         outline = Polyline(np.concatenate(parts), closed=True)
-        against = float((np.array([lines[k].length for k in chain]) * np.where(backwards, 1, -1)).sum())
+        against = float((np.array([lines[k].length for k in order]) * np.where(backwards, 1, -1)).sum())
         is_tie = abs(against) <= AREA_ROUNDING * outline.length
         if outline.signed_area < 0 if is_tie else against > 0:
-            outline = outline.reversed()
-        filled = filled_outlines([outline.points], "nonzero")
-        area = sum(abs(Polyline(points, closed=True).signed_area) for points in filled)
-        if area > outline.length * max(widest, AREA_ROUNDING * outline.length):
-            outlines.append(([numbers[k] for k in chain], outline))
-    return outlines
+            order, backwards, outline = order[::-1], ~backwards[::-1], outline.reversed()
+            parts = [part[::-1] for part in parts[::-1]]
+        closing = np.stack([[part[-1] for part in parts], [part[0] for part in (*parts[1:], parts[0])]], axis=1)
+        found.append(Chain([numbers[k] for k in order], backwards, outline, closing))
+    return found
 
 
-def partners(ends: Floats, room: Floats) -> tuple[Ints, Floats]:
-    """Pair the ends of lines that meet: return (n,) the index of each end's partner, and (n,) its distance.
+def partners(ends: Floats, room: Floats) -> Ints:
+    """Pair the ends of lines that meet, and return (n,) the index of each end's partner.
 
     Two of the (n, 2) ends meet if their distance is at most the `room`, (n,), of both. An end that meets none or
     several others is its own partner.
@@ -113,5 +144,4 @@ def partners(ends: Floats, room: Floats) -> tuple[Ints, Floats]:
     meets = others <= np.minimum(room[:, None], room[near])
     first = np.where(meets.sum(axis=1) == 1, near[np.arange(n), meets.argmax(axis=1)], np.arange(n))
     mutual = first[first] == np.arange(n)
-    partner = np.where(mutual, first, np.arange(n))
-    return partner, np.linalg.norm(ends - ends[partner], axis=1)
+    return np.where(mutual, first, np.arange(n))

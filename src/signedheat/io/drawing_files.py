@@ -549,7 +549,7 @@ def read_dxf(path: PathLike) -> list[tuple[Floats, bool]]:
     drawing = parsed("dxf", path, "ezdxf", ".dxf files", sag=DXF_SAG)
     lines = np.split(drawing["points"], np.cumsum(drawing["counts"])[:-1])
     drawn = [Polyline(p, len(p) > 2 and bool((p[0] == p[-1]).all())) for p in lines if (p != p[0]).any()]
-    outlines, _, _ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", 1 / FINEST_DRAWING)
+    outlines, *_ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", 1 / FINEST_DRAWING)
     return [(line.points, line.closed) for line in outlines]
 
 
