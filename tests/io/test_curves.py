@@ -111,6 +111,17 @@ def test_damaged_json_is_refused(content, error, tmp_path):
         sh.io.read_curves(path, square(4))
 
 
+@pytest.mark.parametrize("content", [
+    [[0, 0, 0], [1, 0, 0]], {"curves": []}, {"type": "LineString", "coordinates": [[0, 0], [1, 0]]},
+])  # fmt: skip
+def test_json_of_another_kind_says_how_curves_are_written(content, tmp_path):
+    path = tmp_path / "lines.json"
+    path.write_text(json.dumps(content))
+    with refused(sh.errors.FileFormatError) as caught:
+        sh.io.read_curves(path, square(4))
+    assert '"polylines"' in caught.value.remedy and "Error" not in str(caught.value)
+
+
 def test_unknown_formats_are_refused_and_nothing_is_overwritten(tmp_path):
     mesh = square(4)
     with refused(sh.errors.FileFormatError):

@@ -491,6 +491,6 @@ def contour(arguments: Namespace) -> Summary:
     else:
         shapes.save_level(surface, path, image, field if on_grid else None)
         numbers = shapes.sizes_of(surface)
-    kind = next(name for name in ("curves", "lines", "faces") if name in numbers)
+    kind = next(name for name in ("curve", "line", "face") if f"{name}s" in numbers)
     summary = {"input": arguments.field, "level": arguments.level, "output": path, **numbers}
-    return summary, f"{printable(path)}: {numbers[kind]} {kind}"
+    return summary, f"{printable(path)}: {counted(numbers[f'{kind}s'], kind)}"

@@ -238,6 +238,11 @@ def read_json(path: PathLike, domain: EmbeddedSurface) -> list[Group] | list[Cur
     """Read vertex ids and weights, or polylines in space, from JSON."""
     try:
         content = json_of(text(path))
+        if not isinstance(content, dict) or not {"polylines", "groups"} & set(content):
+            raise FileFormatError(
+                'the file has neither "polylines" nor "groups"',
+                remedy='write curves by write_curves, or as {"polylines": [{"points": [[x, y, z], …]}, …]}',
+            )
         if "polylines" not in content:
             return groups_of(content)
         lines = [
