@@ -129,3 +129,19 @@ def test_angles_and_the_direction_that_they_mean_show_the_same():
         view.draw_surface(field, axes, view=seen_from)
         pictures.append(axes.images[0].get_array())
     np.testing.assert_array_equal(*pictures)
+
+
+@pytest.mark.parametrize(("name", "things"), [
+    ("save_surface", {"mesh": "save_scene", "grid": "save_slices", "array": "signed_distance"}),
+    ("save_slices", {"mesh": "save_scene", "surface": "save_surface", "array": "signed_distance"}),
+    ("save_row", {"mesh": "title", "grid": "title", "array": "title", "list": "title", "nothing": "title"}),
+])  # fmt: skip
+def test_what_is_drawn_by_another_function_is_told(tmp_path, name, things):
+    ball = samples.sphere(1)
+    grid, surface = sh.signed_distance(ball, resolution=8), sh.Field(ball, ball.vertices[:, 2])
+    odd = {"mesh": ball, "grid": grid, "surface": surface, "array": grid.values, "list": [grid, ball], "nothing": []}
+    for kind, word in things.items():
+        with refused(sh.errors.UnsupportedTypeError) as caught:
+            getattr(view, name)(odd[kind], tmp_path / "picture.png")
+        assert word in caught.value.remedy
+        assert not (tmp_path / "picture.png").exists()

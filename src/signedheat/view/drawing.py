@@ -51,7 +51,11 @@ def save_row(panels: Iterable[tuple[Any, ...]], path: PathLike) -> None:
     UnsupportedTypeError
         If something is neither a shape nor a field.
     """
-    listed = list(panels)
+    listed = list(panels) if isinstance(panels, Iterable) else []
+    if not listed or not all(isinstance(panel, tuple | list) and len(panel) in (2, 3) for panel in listed):
+        raise UnsupportedTypeError(
+            "a row is drawn of panels", remedy="pass [(title, shape or field), …]", element="panels"
+        )
     with picture(path, 4.3 * len(listed), 4.3, dpi=110) as figure:  # in inches
         for k, (title, thing, *options) in enumerate(listed):
             axes = figure.add_subplot(1, len(listed), k + 1)

@@ -24,7 +24,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..tets.tet_mesh import TetMesh
 from ..validation import numbers
 from .figures import add_color_bar, distance_colors, isolines_between, picture, range_of
-from .surface_pictures import outside_of, triangulated
+from .surface_pictures import outside_of, refuse_to_draw, triangulated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,6 +65,7 @@ def save_slices(
     GeometryError
         If the field has one dimension, or more than three, or no value anywhere.
     """
+    refuse_to_draw(field, on_surface=False)
     if isinstance(field.domain, TetMesh):
         grid = Grid.around(field.domain.bounds, resolution=TET_NODES, padding=0.0)
         field = Field(grid, field(grid.points.reshape(-1, 3)).reshape(grid.shape))

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ..arrays import Bools, Floats, Ints, place
 from ..compiled import compiled
 from ..curves.cut_surface import CutSurface
-from ..errors import GeometryError
+from ..errors import GeometryError, UnsupportedTypeError
 from ..fields.field import Field
+from ..grids.grid import Grid
 from ..io.files import PathLike, ensure_writable, extension, replacing
 from ..io.numpy_files import write_npz
 from ..io.ply import write_ply
@@ -341,6 +342,22 @@ def save_surface(
         axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=2, frameon=False, fontsize=8)
 
 
+def refuse_to_draw(field: object, on_surface: bool) -> None:
+    """Raise an error unless an object is a field on a surface or, if not `on_surface`, on a grid or on tets."""
+    if not isinstance(field, Field):
+        raise UnsupportedTypeError(
+            f"{type(field).__name__} is no field",
+            remedy="pass what signed_distance returns; shapes are drawn by save_scene",
+            element="field",
+        )
+    if isinstance(field.domain, Grid | TetMesh) == on_surface:
+        raise UnsupportedTypeError(
+            f"the field lies on a {type(field.domain).__name__}",
+            remedy=f"draw it by {'save_slices' if on_surface else 'save_surface'}",
+            element="field",
+        )
+
+
 def draw_surface(
     field: Field[Any],
     axes: Axes,
@@ -370,6 +387,7 @@ def draw_surface(
     colors : matplotlib.cm.ScalarMappable, optional
         The colours of values. If they are given, isolines and colour bar are left out.
     """
+    refuse_to_draw(field, on_surface=True)
     source_mesh, mesh, values = _source_mesh_and_painted(field)
     given = sources if isinstance(sources, Sequence) else [sources]
     flat = [item for source in given for item in (source if isinstance(source, Sequence) else [source])]
