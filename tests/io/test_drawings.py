@@ -63,6 +63,10 @@ def test_points_are_no_lines():
         sh.signed_distance(shapely.Point(0, 0))
     with refused(sh.errors.GeometryError):
         sh.signed_distance(shapely.Polygon())
+    features = [{"type": "Feature", "geometry": part} for part in (None, shapely.geometry.mapping(PLATE))]
+    features += [{"type": "Feature", "geometry": {"type": "MultiPoint", "coordinates": [[0, 0]]}}]
+    with refused(sh.errors.UnsupportedTypeError, "feature 2"):
+        sh.signed_distance({"type": "FeatureCollection", "features": features})
 
 
 def test_geojson_files(tmp_path):

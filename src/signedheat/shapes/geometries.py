@@ -48,15 +48,16 @@ def polylines_of(geometry: Mapping[str, Any]) -> list[Polyline]:
     return lines
 
 
-def _lines(geometry: Mapping[str, Any]) -> Iterator[Polyline]:
-    """Yield the lines of `polylines_of`, also of nested collections."""
+def _lines(geometry: Mapping[str, Any], feature: int | None = None) -> Iterator[Polyline]:
+    """Yield the lines of `polylines_of`, also of nested collections; errors name the number of a feature."""
     kind, coordinates = str(geometry.get("type")), geometry.get("coordinates") or ()
     if kind == "Feature":
         if geometry.get("geometry"):
-            yield from _lines(geometry["geometry"])
+            yield from _lines(geometry["geometry"], feature)
     elif kind in ("FeatureCollection", "GeometryCollection"):
-        for part in geometry.get("features" if kind == "FeatureCollection" else "geometries") or ():
-            yield from _lines(part)
+        members = geometry.get("features" if kind == "FeatureCollection" else "geometries") or ()
+        for number, part in enumerate(members):
+            yield from _lines(part, number if kind == "FeatureCollection" else feature)
     elif kind in ("LineString", "LinearRing", "MultiLineString"):
         for points in (coordinates if kind == "MultiLineString" else [coordinates]) if coordinates else ():
             yield _polyline(points, kind == "LinearRing")
@@ -67,7 +68,9 @@ def _lines(geometry: Mapping[str, Any]) -> Iterator[Polyline]:
                 yield line.reversed() if (line.signed_area > 0) == (number == 0) else line
     else:
         raise UnsupportedTypeError(
-            f"a {kind} has no lines", remedy="pass lines and polygons; for points use sh.PointCloud", element=kind
+            f"a {kind} has no lines" if feature is None else f"feature {feature} is a {kind}, which has no lines",
+            remedy="leave it out, and pass lines and polygons; for points use sh.PointCloud",
+            element=kind if feature is None else f"feature {feature}",
         )
 
 
