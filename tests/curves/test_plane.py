@@ -326,6 +326,16 @@ def test_rings_with_narrow_gaps_are_outlines_whatever_they_meet(gone, way):
         assert (found.faces < 0).mean() <= 2 * gone + 0.01 and ((found.faces < 0).any() or gone < 0.01)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("gone", [(0.01, 0.0), (0.0, 0.01), (0.02, 0.015), (0.1, 0.0)])
+def test_a_ring_with_a_gap_is_a_hole_in_another_whichever_way_it_runs(gone, way):
+    lines = [circle(0, 0, 1, gone=gone[0]), circle(0.1, 0, 0.5, 2.0, gone=gone[1])[::way]]
+    if gone[1] == 0:  # what closes says itself on which side it is, by its direction
+        lines = [lines[0][::way], lines[1][::-way]]
+    field = sh.signed_distance([sh.Polyline(line) for line in lines], resolution=48)
+    np.testing.assert_array_equal(field([[0.1, 0], [-0.7, 0], [0.85, 0], [1.15, 0]]) < 0, [False, True, True, False])
+
+
 def test_distance_across_a_gap_is_to_its_straight_line():
     field = sh.signed_distance(sh.Polyline(circle(0, 0, 1, gone=0.02)), resolution=16)
     found = field.closest(np.array([[0.5, 0.5 * np.tan(0.02 * np.pi)], [-0.5, 0.0]]))

@@ -36,7 +36,7 @@ from ..surfaces.triangle_mesh import TriangleMesh
 from ..validation import SMALLEST_EXTENT, flag, query_points, shaped
 from .curve_distance import CurvesTaken, distance_to_pieces
 from .gaps import Gaps
-from .outlines import chains, outlines_filled
+from .outlines import WHOLE, chains, enclosed, outlines_filled, segments_of_lines, turned_by_depth
 from .resolution import on_resolving_triangles
 
 FINEST_DRAWING = 1024
@@ -158,30 +158,24 @@ def _field_of(drawing: Drawing, grid: Grid, diagnostics: Diagnostics) -> Field[G
 
 
 def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
-    """Orient open lines that nearly close together as outlines, by the number of other outlines that enclose each.
+    """Orient open lines that nearly close together as outlines, and closed ones inside them as holes.
 
-    Inside an even number of others a chain of lines bounds a filled region, inside an odd number a hole. Lines that are
-    closed, or in chains that do not nearly close, are returned as they are.
+    `turned_by_depth` says how. Lines in chains that do not nearly close are returned as they are.
     """
-    joined = chains({k: line for k, line in enumerate(lines) if not line.closed}, 1 / FINEST_DRAWING)
     nearly = [
         chain
-        for chain in joined
+        for chain in chains({k: line for k, line in enumerate(lines) if not line.closed}, WHOLE)
         if chain.gaps[-1] < NEARLY_CLOSED * (chain.outline.length - chain.gaps[-1])
         and chain.encloses(float(chain.gaps[:-1].max(initial=0.0)))
     ]
-    if not nearly:
-        return list(lines)
-    begins = np.array([chain.outline.points[0] for chain in nearly])
-    depths = _enclosed(segments_of_lines([line for line in lines if line.closed]), begins).astype(np.int64)
-    for number, chain in enumerate(nearly):
-        within = _enclosed(chain.outline.segments, begins)
-        within[number] = False
-        depths += within
     result = list(lines)
-    for chain, depth in zip(nearly, depths.tolist(), strict=True):
-        turns = (chain.outline.signed_area > 0) == (depth % 2 == 0)
-        for k in np.array(chain.members)[chain.backwards != turns].tolist():
+    closed = [k for k, line in enumerate(lines) if line.closed]
+    turns, holes = turned_by_depth(nearly, [lines[k] for k in closed])
+    for chain, turn in zip(nearly, turns, strict=True):
+        for k in np.array(chain.members)[chain.backwards != turn].tolist():
+            result[k] = result[k].reversed()
+    for k, hole in zip(closed, holes, strict=True):
+        if hole:
             result[k] = result[k].reversed()
     return result
 
@@ -262,11 +256,6 @@ def apart_from(segments: Floats, closing: Floats) -> tuple[Floats, Floats]:
     rounding = AREA_ROUNDING * float(np.ptp(segments.reshape(-1, 2), axis=0).max())
     runs_along = tree_of(closing).distances(_in_space(segments.mean(axis=1))) <= rounding
     return segments[~runs_along], segments[runs_along]
-
-
-def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
-    """Return the ends of all segments of lines in the plane, line after line, as (m, 2, 2) coordinates."""
-    return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,7 +388,7 @@ class Drawing(Frozen):
         sides = np.where(heights < 0, -1.0, 1.0)
         crowded |= np.abs(heights) <= LEAST_SLOPE * away
         if self.phi is None and crowded.any():  # outlines touch, normals cancel at spikes, or corners are near
-            sides[crowded] = np.where(_enclosed(self._segments, points[crowded]), -1.0, 1.0)
+            sides[crowded] = np.where(enclosed(self._segments, points[crowded]), -1.0, 1.0)
         return sides
 
 
@@ -418,20 +407,3 @@ def tree_of(segments: Floats) -> FaceTree:
     corners = np.pad(np.stack([a, b, (a + b) / 2], axis=1), ((0, 0), (0, 0), (0, 1)))
     corners[:, 2, 2] = np.linalg.norm(b - a, axis=1)
     return FaceTree.of_triangles(corners)
-
-
-def _enclosed(outlines: Floats, points: Floats) -> Bools:
-    """Return (n,) bool, true for (n, 2) points from which a ray meets an odd number of (m, 2, 2) segments.
-
-    These points are inside if the segments form closed outlines that do not cross.
-    """
-    inside = np.zeros(len(points), dtype=bool)
-    a, b = outlines.transpose(1, 0, 2)
-    step = max(1, 10**6 // max(len(outlines), 1))  # a million pairs at a time
-    for begin in range(0, len(points), step):
-        x, y = points[begin : begin + step, None].transpose(2, 0, 1)
-        spans = (a[:, 1] <= y) != (b[:, 1] <= y)
-        turn = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])
-        crossed = spans & ((turn > 0) == (b[:, 1] > a[:, 1])) & (turn != 0)
-        inside[begin : begin + step] = crossed.sum(axis=1) % 2 == 1
-    return inside

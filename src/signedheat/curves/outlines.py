@@ -16,6 +16,13 @@ from ..mesh.polylines import FillRule, assemble_polylines, filled_outlines
 from ..mesh.triangles import AREA_ROUNDING
 from ..mesh.welding import ONE_PLACE
 
+WHOLE = 1 / 1024
+"""Width of a gap, relative to the length of the shorter line at it or of the chain, up to which lines count as joined
+and as closed."""
+
+PROBES = 8
+"""Number of points of a line that must lie inside another for the line to count as inside."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class OutlinesFilled(Note):
@@ -38,26 +45,66 @@ def outlines_filled(
 ) -> tuple[list[Polyline], list[int], OutlinesFilled | None, Floats]:
     """Replace closed lines by the outlines of the region that they fill; return these first, then the open lines.
 
-    Open lines that close together (`closed_together`) count as a closed line; `narrow` is passed on. The second result
-    has a number for each line, for messages: open lines keep theirs, and outlines get those of closed lines, or higher
-    ones if there are more outlines. The third is a note, None if no outline is filled. The last are the straight
-    segments that closed gaps wider than rounding, (k, 2, 2).
+    Open lines that close together (`closed_together`), with gaps of up to `narrow`, count as a closed line. Where gaps
+    are wider than `WHOLE`, directions do not matter, and an outline inside an odd number of others is a hole.
+
+    The second result has a number for each line, for messages: open lines keep theirs, and outlines get those of closed
+    lines, or higher ones if there are more outlines. The third is a note, None if no outline is filled. The last are
+    the straight segments that closed gaps wider than rounding, (k, 2, 2).
     """
     outlines = {k: line for k, line in enumerate(lines) if line.closed}
     strokes = distinct({k: line for k, line in enumerate(lines) if not line.closed})
-    closing = [np.empty((0, 2, 2))]
-    for chain in closed_together(strokes, narrow):
-        outlines[min(chain.members)] = chain.outline
-        closing.append(chain.closing[chain.gaps > AREA_ROUNDING * chain.outline.length])
-        strokes = {k: line for k, line in strokes.items() if k not in chain.members}
-    numbers = sorted(outlines)
-    filled = [Polyline(points, closed=True) for points in filled_outlines([outlines[k].points for k in numbers], rule)]
+    whole = closed_together(strokes, WHOLE)
+    outlines |= {min(chain.members): chain.outline for chain in whole}
+    filled = region_of([outlines[k] for k in sorted(outlines)], rule)
+    strokes = without_members(strokes, whole)
+    nearly = closed_together(strokes, narrow)
+    outlines |= {min(chain.members): chain.outline for chain in nearly}
+    if nearly:
+        turns, holes = turned_by_depth(nearly, filled)
+        around = [c.outline.reversed() if turn else c.outline for c, turn in zip(nearly, turns, strict=True)]
+        inner = [line.reversed() if hole else line for line, hole in zip(filled, holes, strict=True)]
+        filled = region_of([*around, *inner], rule)
     if not filled:
-        return list(lines), list(range(len(lines))), None, closing[0]
+        return list(lines), list(range(len(lines))), None, np.empty((0, 2, 2))
+    strokes = without_members(strokes, nearly)
     given, left = sum(line.length for line in outlines.values()), sum(line.length for line in filled)
     note = OutlinesFilled(rule, len(outlines), max(0.0, 1.0 - left / given))
-    numbers = [*numbers, *range(len(lines), len(lines) + len(filled))][: len(filled)]
-    return [*filled, *strokes.values()], [*numbers, *strokes], note, np.concatenate(closing)
+    numbers = [*sorted(outlines), *range(len(lines), len(lines) + len(filled))][: len(filled)]
+    closing = [c.closing[c.gaps > AREA_ROUNDING * c.outline.length] for c in (*whole, *nearly)]
+    across = np.concatenate([np.empty((0, 2, 2)), *closing])
+    return [*filled, *strokes.values()], [*numbers, *strokes], note, across
+
+
+def region_of(outlines: Sequence[Polyline], rule: FillRule) -> list[Polyline]:
+    """Return the outlines of the region that closed lines fill by a rule (`filled_outlines`)."""
+    return [Polyline(points, closed=True) for points in filled_outlines([line.points for line in outlines], rule)]
+
+
+def turned_by_depth(nearly: Sequence[Chain], filled: Sequence[Polyline]) -> tuple[list[bool], list[bool]]:
+    """Say which of k chains, and which of m outlines of a region, must be reversed to bound something together.
+
+    A chain bounds a filled region inside an even number of others, and a hole inside an odd number. `filled` bound a
+    region already; inside an odd number of chains, that is a hole. `PROBES` points of a line decide what is around it.
+    """
+    lines = [*(chain.outline for chain in nearly), *filled]
+    places = [line.points[np.linspace(0, line.n_points - 1, PROBES).astype(np.int64)] for line in lines]
+    points = np.concatenate([np.empty((0, 2)), *places])
+    depths = enclosed(segments_of_lines(filled), points).reshape(-1, PROBES).all(axis=1).astype(np.int64)
+    depths[len(nearly) :] = 0
+    for number, chain in enumerate(nearly):
+        within = enclosed(chain.outline.segments, points).reshape(-1, PROBES).all(axis=1)
+        within[number] = False
+        depths += within
+    is_hole = (depths % 2 == 1).tolist()
+    turns = [(chain.outline.signed_area > 0) != hole for chain, hole in zip(nearly, is_hole, strict=False)]
+    return turns, is_hole[len(nearly) :]
+
+
+def without_members(strokes: dict[int, Polyline], joined: Sequence[Chain]) -> dict[int, Polyline]:
+    """Return strokes, keyed by number, without those in some chains."""
+    members = {k for chain in joined for k in chain.members}
+    return {k: line for k, line in strokes.items() if k not in members}
 
 
 def distinct(strokes: dict[int, Polyline]) -> dict[int, Polyline]:
@@ -84,8 +131,7 @@ class Chain:
 
     def encloses(self, width: float) -> bool:
         """Whether the outline encloses more than a line drawn there and back does, that far apart."""
-        filled = filled_outlines([self.outline.points], "nonzero")
-        area = sum(abs(Polyline(points, closed=True).signed_area) for points in filled)
+        area = sum(abs(line.signed_area) for line in region_of([self.outline], "nonzero"))
         return area > self.outline.length * max(width, AREA_ROUNDING * self.outline.length)
 
 
@@ -145,3 +191,25 @@ def partners(ends: Floats, room: Floats) -> Ints:
     first = np.where(meets.sum(axis=1) == 1, near[np.arange(n), meets.argmax(axis=1)], np.arange(n))
     mutual = first[first] == np.arange(n)
     return np.where(mutual, first, np.arange(n))
+
+
+def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
+    """Return the ends of all segments of lines in the plane, line after line, as (m, 2, 2) coordinates."""
+    return np.concatenate([np.empty((0, 2, 2)), *(line.segments for line in lines)])
+
+
+def enclosed(outlines: Floats, points: Floats) -> Bools:
+    """Return (n,) bool, true for (n, 2) points from which a ray meets an odd number of (m, 2, 2) segments.
+
+    These points are inside if the segments form closed outlines that do not cross.
+    """
+    inside = np.zeros(len(points), dtype=bool)
+    a, b = outlines.transpose(1, 0, 2)
+    step = max(1, 10**6 // max(len(outlines), 1))  # a million pairs at a time
+    for begin in range(0, len(points), step):
+        x, y = points[begin : begin + step, None].transpose(2, 0, 1)
+        spans = (a[:, 1] <= y) != (b[:, 1] <= y)
+        turn = (b[:, 0] - a[:, 0]) * (y - a[:, 1]) - (b[:, 1] - a[:, 1]) * (x - a[:, 0])
+        crossed = spans & ((turn > 0) == (b[:, 1] > a[:, 1])) & (turn != 0)
+        inside[begin : begin + step] = crossed.sum(axis=1) % 2 == 1
+    return inside

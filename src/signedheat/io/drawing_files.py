@@ -13,8 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from ..arrays import Complexes, Floats
-from ..curves.drawings import FINEST_DRAWING
-from ..curves.outlines import distinct, outlines_filled
+from ..curves.outlines import WHOLE, distinct, outlines_filled
 from ..errors import FileFormatError, GeometryError, quoted
 from ..grids.polyline import Polyline
 from ..mesh.polylines import filled_outlines
@@ -549,7 +548,7 @@ def read_dxf(path: PathLike) -> list[tuple[Floats, bool]]:
     drawing = parsed("dxf", path, "ezdxf", ".dxf files", sag=DXF_SAG)
     lines = np.split(drawing["points"], np.cumsum(drawing["counts"])[:-1])
     drawn = [Polyline(p, len(p) > 2 and bool((p[0] == p[-1]).all())) for p in lines if (p != p[0]).any()]
-    outlines, *_ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", 1 / FINEST_DRAWING)
+    outlines, *_ = outlines_filled(list(distinct(dict(enumerate(drawn))).values()), "evenodd", WHOLE)
     return [(line.points, line.closed) for line in outlines]
 
 
