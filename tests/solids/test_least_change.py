@@ -115,6 +115,16 @@ def test_triangles_that_only_rounding_separates_are_not_divided_along_each_other
     assert solid.volume == pytest.approx(0.4, rel=40 * noise)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-12, 1e-9, 1e-8])
+@pytest.mark.parametrize("which", [slice(0), slice(None), slice(None, None, 2)], ids=["alike", "turned", "half turned"])
+def test_triangles_that_only_rounding_separates_are_one_body_given_twice(noise, which):
+    vertices, faces = box((0, 0, 0), (2, 1, 0.7))
+    apart = vertices[faces].reshape(-1, 3)
+    apart = apart + noise * np.random.default_rng(0).normal(size=apart.shape), np.arange(len(apart)).reshape(-1, 3)
+    solid = sh.complete(joined(apart, turned(apart, which)))
+    assert solid.volume == pytest.approx(1.4, rel=1e-12 + 10 * noise) and (solid.origins >= 0).all()
+
+
 @pytest.mark.parametrize("gap", [0.002, 0.01, 0.04])
 def test_panels_with_gaps_between_them_are_the_body(gap):
     """Octants of an ellipsoid, moved apart; each has the vertices of its own."""
@@ -186,14 +196,15 @@ def test_a_body_far_from_the_origin_is_as_exact_as_its_coordinates(place):
     assert volume((moved, faces)) == pytest.approx(samples.sphere(2).volume, rel=1e-9 + 2**-48 * place)
 
 
+@pytest.mark.parametrize("copies", [1, 2])
 @pytest.mark.parametrize("share", [0.0, 0.5])
-def test_walls_that_end_in_the_middle_of_a_roof_make_no_eaves(share):
+def test_walls_that_end_in_the_middle_of_a_roof_make_no_eaves(share, copies):
     """The roof's faces have no vertices at the walls: what reaches beyond these bounds nothing."""
     walls = box((0, 0, 0), (2, 3, 1), without=(1,))
     roof = np.array([[-0.5, -0.5, 1], [2.5, -0.5, 1], [2.5, 3.5, 1], [-0.5, 3.5, 1]]), np.array([[0, 1, 2], [0, 2, 3]])
-    mesh = joined(walls, roof)
+    mesh = joined(*[walls] * copies, roof)
     solid = sh.complete(turned(mesh, np.random.default_rng(1).random(len(mesh[1])) < share))
-    assert solid.volume == pytest.approx(6.0)
+    assert solid.volume == pytest.approx(6.0) and (solid.origins >= 0).all()
     assert solid.distance([[-0.4, 1, 0.9], [-0.4, 1, 1.1]]) == pytest.approx(0.1)
 
 

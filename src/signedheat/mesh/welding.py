@@ -76,7 +76,13 @@ def joined_faces(points: Floats, faces: Ints) -> Ints:
     """Return (m, 3) faces between vertices that are one where they coincide, exactly or, on rims and copies, nearly."""
     faces = same_positions(points)[faces]
     faces = joined_copies(points, faces)[faces]
-    return joined_rims(points, faces.ravel(), np.roll(faces, -1, axis=1).ravel(), ONE_PLACE)[faces]
+    once = faces[first_copies(faces)]  # since copies have their rims in common, too
+    return joined_rims(points, once.ravel(), np.roll(once, -1, axis=1).ravel(), ONE_PLACE)[faces]
+
+
+def first_copies(faces: Ints) -> Bools:
+    """Return (m,) which of (m, 3) faces are the first on their vertices; none with fewer than three of these."""
+    return np.asarray(coincident_faces(faces.ravel(), np.arange(0, 3 * len(faces) + 1, 3))[0] == np.arange(len(faces)))
 
 
 def joined_rims(points: Floats, tails: Ints, heads: Ints, units: float) -> Ints:

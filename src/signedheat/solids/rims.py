@@ -14,7 +14,7 @@ from ..mesh.components import grouped, next_in_groups, sums_of
 from ..mesh.edges import edge_table
 from ..mesh.triangles import area_vectors, corner_normals
 from ..mesh.unit_vectors import ANGLE_ROUNDING, SAME_WAY, angles_around, unit
-from ..mesh.welding import joined_faces, tolerances
+from ..mesh.welding import first_copies, joined_faces, tolerances
 from ..parallel import PointTree
 from ..surfaces.triangle_mesh import TriangleMesh
 
@@ -231,10 +231,11 @@ def divided_at_rims(mesh: TriangleMesh) -> tuple[TriangleMesh, Ints]:
     """
     points, faces = mesh.vertices, joined_faces(mesh.vertices, mesh.faces)
     table = edge_table(faces)
-    loose = (table.face_counts[table.face_edges] == 1).all(axis=1)  # loose triangles end nowhere
+    counts = np.bincount(table.face_edges[first_copies(faces)].ravel(), minlength=len(table.vertices))
+    loose = (counts[table.face_edges] == 1).all(axis=1)  # loose triangles end nowhere
     in_surface = np.zeros(len(table.vertices), dtype=bool)
     in_surface[table.face_edges[~loose]] = True
-    is_open = np.flatnonzero((table.face_counts == 1) & in_surface)
+    is_open = np.flatnonzero((counts == 1) & in_surface)
     if not len(is_open):
         return mesh, np.arange(mesh.n_faces)
     # pairs of an open edge and a face whose box it meets, and in whose plane it lies
