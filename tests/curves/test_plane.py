@@ -2,6 +2,7 @@
 
 import warnings
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -352,6 +353,34 @@ def test_lines_that_join_and_nearly_close_are_an_outline(ways):
     lines = [*whole, *(sh.Polyline(side.points * [0.5, 1.0] + [3, 0]) for side in box)]
     field = sh.signed_distance(lines, resolution=48)
     assert field([[0, 0], [3, 0]]).max() < -0.4 and field([[1.5, 0], [-1.5, 0], [4.5, 0], [3, 1.5]]).min() > 0.3
+
+
+ROOMS = {"two": [(0, 0), (2, 0)], "bend": [(0, 0), (2, 0), (0, 2)], "four": [(0, 0), (2, 0), (0, 2), (2, 2)]}
+
+
+@pytest.mark.parametrize("plan", [*ROOMS, "row", "diagonal"])
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.1])
+@pytest.mark.parametrize("walls", ["twice", "once"])
+def test_rooms_that_share_walls_are_filled_however_their_walls_are_given(plan, angle, walls):
+    """Every wall is a line of its own; those between rooms are given once, or with each room."""
+    moves = {"row": [(2 * k, 0) for k in range(5)], "diagonal": [(0, 0), (2, 2)], **ROOMS}[plan]
+    rng = np.random.default_rng(0)
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    sides_of_rooms = [np.array(side) + move for move in moves for side in pairwise([*SQUARE, SQUARE[0]])]
+    if walls == "once":
+        sides_of_rooms = list({tuple(side.mean(axis=0)): side for side in sides_of_rooms}.values())
+    lines = [sh.Polyline(side[:: rng.choice([-1, 1])] @ turn) for side in sides_of_rooms]
+    stairs = sh.Polyline(np.array([[-1, -1], [-1.4, -1.2]]) @ turn)  # they lead nowhere
+    points = rng.uniform(-1.5, 9.5, (2000, 2))
+    inside = np.any([(np.abs(points - move) < 1).all(axis=1) for move in moves], axis=0)
+    exact = sh.signed_distance([sh.Polyline((SQUARE + m) @ turn, closed=True) for m in moves], resolution=16)
+    field = sh.signed_distance([lines[k] for k in rng.permutation(len(lines))], resolution=16)
+    found, expected = (f.closest(points @ turn).distances for f in (field, exact))
+    clear = np.abs(expected) > 1e-9
+    np.testing.assert_array_equal((found < 0)[clear], inside[clear])
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    left = sh.signed_distance([*lines, stairs], resolution=48)
+    assert ((left.closest(points @ turn).distances < 0) == inside)[np.abs(expected) > 0.1].all()
 
 
 def test_a_bow_in_strokes_is_a_guess():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 import scipy
@@ -12,6 +12,7 @@ import scipy
 from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Note
 from ..grids.polyline import Polyline
+from ..mesh.components import connected_components, grouped
 from ..mesh.polylines import FillRule, assemble_polylines, filled_outlines
 from ..mesh.triangles import AREA_ROUNDING
 from ..mesh.welding import ONE_PLACE
@@ -20,6 +21,8 @@ WHOLE = 1 / 1024
 """Width of a gap, relative to the length of the shorter line at it or of the chain, up to which lines count as joined
 and as closed."""
 
+MOST_MEETING = 12
+"""Number of ends of lines that are searched for around each other; more meet if each is near some of the others."""
 PROBES = 8
 """Number of points of a line that must lie inside another for the line to count as inside."""
 
@@ -68,7 +71,8 @@ def outlines_filled(
     if not filled:
         return list(lines), list(range(len(lines))), None, np.empty((0, 2, 2))
     strokes = without_members(strokes, nearly)
-    given, left = sum(line.length for line in outlines.values()), sum(line.length for line in filled)
+    inner = [lines[k] for chain in (*whole, *nearly) for k in chain.within]
+    given, left = (sum(line.length for line in drawn) for drawn in ([*outlines.values(), *inner], filled))
     note = OutlinesFilled(rule, len(outlines), max(0.0, 1.0 - left / given))
     numbers = [*sorted(outlines), *range(len(lines), len(lines) + len(filled))][: len(filled)]
     closing = [c.closing[c.gaps > AREA_ROUNDING * c.outline.length] for c in (*whole, *nearly)]
@@ -103,7 +107,7 @@ def turned_by_depth(nearly: Sequence[Chain], filled: Sequence[Polyline]) -> tupl
 
 def without_members(strokes: dict[int, Polyline], joined: Sequence[Chain]) -> dict[int, Polyline]:
     """Return strokes, keyed by number, without those in some chains."""
-    members = {k for chain in joined for k in chain.members}
+    members = {k for chain in joined for k in (*chain.members, *chain.within)}
     return {k: line for k, line in strokes.items() if k not in members}
 
 
@@ -123,6 +127,7 @@ class Chain:
     backwards: Bools  # (k,) whether each line runs against the outline
     outline: Polyline  # the lines, closed by a straight segment; it runs as most of their length does
     closing: Floats  # (k, 2, 2) the segment from the end of each line to the beginning of the next
+    within: list[int]  # the numbers of lines inside, which end on others on both sides
 
     @property
     def gaps(self) -> Floats:
@@ -147,12 +152,22 @@ def closed_together(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
     ]
 
 
+Run: TypeAlias = tuple[Ints, Bools]
+"""Indices of lines that follow each other, and whether each runs backwards."""
+
+
+def reverse(run: Run) -> Run:
+    """Return the same lines from last to first."""
+    return run[0][::-1], ~run[1][::-1]
+
+
 def chains(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
     """Join open lines, keyed by number, end to end; every line is in one chain.
 
-    Two lines join if no third line ends there and the distance between their ends is due to rounding or below `narrow`
-    times the length of the shorter line. A chain gets the direction of most of its length, or runs counter-clockwise
-    if half of it has either direction.
+    Two lines meet if the distance between their ends is due to rounding or below `narrow` times the length of the
+    shorter line. A chain goes on where two ends meet. Chains that form a network with junctions of more ends are one
+    chain, the way round the network; those that lead nowhere stay chains of their own. A chain gets the direction of
+    most of its length, or runs counter-clockwise if half of it has either direction.
     """
     numbers, lines = list(strokes), list(strokes.values())
     if not lines:
@@ -160,10 +175,15 @@ def chains(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
     ends = np.concatenate([line.points[[0, -1]] for line in lines])
     lengths = np.repeat([line.length for line in lines], 2)
     rounding = ONE_PLACE * np.spacing(np.abs(ends).max(axis=1))
-    partner = partners(ends, np.maximum(rounding, narrow * lengths))
-    node = np.minimum(np.arange(len(ends)), partner)
-    found = []
-    for order, backwards, _ in assemble_polylines(node[::2], node[1::2], directed=False):
+    room = np.maximum(rounding, narrow * lengths)
+    nodes = meeting_places(ends, room).reshape(-1, 2)
+    runs = [(k, back) for k, back, _ in assemble_polylines(*nodes.T, directed=False)]
+    between = np.array([[nodes[k[0], int(back[0])], nodes[k[-1], 1 - int(back[-1])]] for k, back in runs])
+
+    def chain(halfedges: list[int], inner: list[int]) -> Chain:
+        """Return the chain of runs, numbered twice, the second number for the way back, with others inside."""
+        ways = [reverse(runs[h // 2]) if h % 2 else runs[h // 2] for h in halfedges]
+        order, backwards = (np.concatenate(columns) for columns in zip(*ways, strict=True))
         parts = [lines[k].points[:: -1 if back else 1] for k, back in zip(order, backwards, strict=True)]
         outline = Polyline(np.concatenate(parts), closed=True)
         against = float((np.array([lines[k].length for k in order]) * np.where(backwards, 1, -1)).sum())
@@ -172,25 +192,85 @@ def chains(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
             order, backwards, outline = order[::-1], ~backwards[::-1], outline.reversed()
             parts = [part[::-1] for part in parts[::-1]]
         closing = np.stack([[part[-1] for part in parts], [part[0] for part in (*parts[1:], parts[0])]], axis=1)
-        found.append(Chain([numbers[k] for k in order], backwards, outline, closing))
-    return found
+        within = [numbers[k] for run in inner for k in runs[run][0]]
+        return Chain([numbers[k] for k in order], backwards, outline, closing, within)
+
+    angles = np.array([_departure(lines, k, back, room) for run in runs for k, back in (run, reverse(run))])
+    middle = ends.mean(axis=0)
+    swept = np.array(
+        [sum(_swept(lines[i].points[:: -1 if b else 1] - middle) for i, b in zip(*run, strict=True)) for run in runs]
+    )
+    networks = ways_round(between, angles, swept)
+    in_network = {run for around, inner in networks for run in (*(h // 2 for h in around), *inner)}
+    alone = [([2 * run], []) for run in range(len(runs)) if run not in in_network]
+    return [chain(around, inner) for around, inner in (*networks, *alone)]
 
 
-def partners(ends: Floats, room: Floats) -> Ints:
-    """Pair the ends of lines that meet, and return (n,) the index of each end's partner.
+def _swept(points: Floats) -> float:
+    """Return twice the area that the ray from the origin to a point sweeps, counter-clockwise, along (n, 2) points."""
+    (x, y), (u, v) = points[:-1].T, points[1:].T
+    return float(x @ v - y @ u)
 
-    Two of the (n, 2) ends meet if their distance is at most the `room`, (n,), of both. An end that meets none or
-    several others is its own partner.
+
+def _departure(lines: Sequence[Polyline], order: Ints, backwards: Bools, room: Floats) -> float:
+    """Return the angle at which a run of lines departs, farther from its end than the room, (n,), of ends there."""
+    points = lines[order[0]].points[:: -1 if backwards[0] else 1]
+    steps = points - points[0]
+    far = np.linalg.norm(steps, axis=1) > room[2 * order[0]]
+    x, y = steps[int(far.argmax())] if far.any() else steps[-1]
+    return float(np.arctan2(y, x))
+
+
+def ways_round(between: Ints, angles: Floats, swept: Floats) -> list[tuple[list[int], list[int]]]:
+    """Find the way round each network of e edges in the plane that bounds something.
+
+    `between` are the nodes at both ends of each edge, (e, 2), `angles` the directions in which it leaves its first node
+    and its last one, (2 e,), and `swept` twice the area that a ray from the origin to it sweeps, (e,). Edges that lead
+    nowhere, and loops, belong to no network. Returns for each network the halfedges on the way round it, 2 i for edge i
+    and 2 i + 1 for its way back, and the edges inside.
     """
+    used = between[:, 0] != between[:, 1]
+    while True:
+        degrees = np.bincount(between[used].ravel(), minlength=int(between.max()) + 1)
+        leads_on = used & (degrees[between] > 1).all(axis=1)
+        if (leads_on == used).all():
+            break
+        used = leads_on
+    tails = between.ravel()
+    halfedges = np.flatnonzero(np.repeat(used, 2))
+    order = halfedges[np.lexsort([angles[halfedges], tails[halfedges]])]
+    starts, members = grouped(tails[order], len(degrees))
+    following = np.full(len(tails), -1)
+    for node in np.flatnonzero(np.diff(starts)).tolist():
+        leaving = order[members[starts[node] : starts[node + 1]]]
+        following[leaving ^ 1] = np.roll(leaving, 1)  # the region between these two is to the left of both
+    network = connected_components(len(degrees), *between[used].T)[between[:, 0]]
+    areas = np.stack([swept, -swept], axis=1).ravel()
+    seen = np.zeros(len(tails), dtype=bool)
+    best: dict[int, tuple[float, list[int]]] = {}
+    for first in halfedges.tolist():
+        way, h = [], first
+        while not seen[h]:
+            seen[h] = True
+            way.append(h)
+            h = int(following[h])
+        area, key = float(areas[way].sum()), int(network[first // 2])
+        if way and area < best.get(key, (0.0, []))[0]:  # what lies around all runs clockwise
+            best[key] = area, way
+    edges = np.flatnonzero(used)
+    return [
+        (way, np.setdiff1d(edges[network[edges] == key], np.array(way) // 2).tolist()) for key, (_, way) in best.items()
+    ]
+
+
+def meeting_places(ends: Floats, room: Floats) -> Ints:
+    """Return (n,) the number of the place of each of (n, 2) ends; two meet if they are within the `room` of both."""
     n = len(ends)
-    distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(3, n))
-    others = np.where(near == np.arange(n)[:, None], np.inf, distances)
-    if n > 2:  # at a place of several ends, an end itself may not be among the first
-        others[~np.isinf(others).any(axis=1), 2] = np.inf
-    meets = others <= np.minimum(room[:, None], room[near])
-    first = np.where(meets.sum(axis=1) == 1, near[np.arange(n), meets.argmax(axis=1)], np.arange(n))
-    mutual = first[first] == np.arange(n)
-    return np.where(mutual, first, np.arange(n))
+    distances, near = scipy.spatial.cKDTree(ends).query(ends, k=min(MOST_MEETING, n))
+    distances, near = distances.reshape(n, -1), near.reshape(n, -1)
+    meets = distances <= np.minimum(room[:, None], room[near])
+    first, column = np.nonzero(meets)
+    return connected_components(n, first, near[first, column])
 
 
 def segments_of_lines(lines: Sequence[Polyline]) -> Floats:
