@@ -337,6 +337,22 @@ def test_a_ring_with_a_gap_is_a_hole_in_another_whichever_way_it_runs(gone, way)
     np.testing.assert_array_equal(field([[0.1, 0], [-0.7, 0], [0.85, 0], [1.15, 0]]) < 0, [False, True, True, False])
 
 
+@pytest.mark.parametrize("gone", [0.0, 0.01, 0.02])
+@pytest.mark.parametrize("broken", [0, 1, 2])
+@pytest.mark.parametrize("way", [1, -1])
+def test_an_island_in_a_lake_stays_whichever_shore_has_a_gap(gone, broken, way):
+    radii, ways = [1.0, 0.7, 0.4], [1, -1, 1]
+    if gone > 0:
+        ways[broken] = way
+    lines = [
+        sh.Polyline(circle(0, 0, radius, k, gone * (k == broken))[::step])
+        for k, (radius, step) in enumerate(zip(radii, ways, strict=True))
+    ]
+    field = sh.signed_distance(lines, resolution=16)
+    found = field.closest([[0.0, 0.1], [0.0, 0.5], [0.0, 0.9], [0.0, 1.1]]).distances
+    np.testing.assert_allclose(found, [-0.3, 0.1, -0.1, 0.1], atol=0.01)
+
+
 def test_distance_across_a_gap_is_to_its_straight_line():
     field = sh.signed_distance(sh.Polyline(circle(0, 0, 1, gone=0.02)), resolution=16)
     found = field.closest(np.array([[0.5, 0.5 * np.tan(0.02 * np.pi)], [-0.5, 0.0]]))

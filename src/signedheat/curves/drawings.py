@@ -170,7 +170,7 @@ def as_outlines(lines: Sequence[Polyline]) -> list[Polyline]:
     ]
     result = list(lines)
     closed = [k for k, line in enumerate(lines) if line.closed]
-    turns, holes = turned_by_depth(nearly, [lines[k] for k in closed])
+    turns, holes = turned_by_depth(nearly, [[lines[k] for k in closed]])
     for chain, turn in zip(nearly, turns, strict=True):
         for k in np.array(chain.members)[chain.backwards != turn].tolist():
             result[k] = result[k].reversed()

@@ -59,15 +59,19 @@ def outlines_filled(
     strokes = distinct({k: line for k, line in enumerate(lines) if not line.closed})
     whole = closed_together(strokes, WHOLE)
     outlines |= {min(chain.members): chain.outline for chain in whole}
-    filled = region_of([outlines[k] for k in sorted(outlines)], rule)
     strokes = without_members(strokes, whole)
     nearly = closed_together(strokes, narrow)
-    outlines |= {min(chain.members): chain.outline for chain in nearly}
+    # what lies inside the same rings with gaps is filled by itself: directions say nothing about anything else
+    closed = [outlines[k] for k in sorted(outlines)]
+    around, group = np.unique(rings_around(closed, nearly), axis=0, return_inverse=True)
+    regions = [region_of([closed[k] for k in np.flatnonzero(group.ravel() == g)], rule) for g in range(len(around))]
+    filled = [line for region in regions for line in region]
     if nearly:
-        turns, holes = turned_by_depth(nearly, filled)
-        around = [c.outline.reversed() if turn else c.outline for c, turn in zip(nearly, turns, strict=True)]
+        turns, holes = turned_by_depth(nearly, regions)
+        rings = [c.outline.reversed() if turn else c.outline for c, turn in zip(nearly, turns, strict=True)]
         inner = [line.reversed() if hole else line for line, hole in zip(filled, holes, strict=True)]
-        filled = region_of([*around, *inner], rule)
+        filled = region_of([*rings, *inner], rule)
+    outlines |= {min(chain.members): chain.outline for chain in nearly}
     if not filled:
         return list(lines), list(range(len(lines))), None, np.empty((0, 2, 2))
     strokes = without_members(strokes, nearly)
@@ -85,21 +89,33 @@ def region_of(outlines: Sequence[Polyline], rule: FillRule) -> list[Polyline]:
     return [Polyline(points, closed=True) for points in filled_outlines([line.points for line in outlines], rule)]
 
 
-def turned_by_depth(nearly: Sequence[Chain], filled: Sequence[Polyline]) -> tuple[list[bool], list[bool]]:
-    """Say which of k chains, and which of m outlines of a region, must be reversed to bound something together.
+def probes_of(lines: Sequence[Polyline]) -> Floats:
+    """Return `PROBES` points of each of n lines, (n * PROBES, 2)."""
+    rows = [line.points[np.linspace(0, line.n_points - 1, PROBES).astype(np.int64)] for line in lines]
+    return np.concatenate([np.empty((0, 2)), *rows])
 
-    A chain bounds a filled region inside an even number of others, and a hole inside an odd number. `filled` bound a
-    region already; inside an odd number of chains, that is a hole. `PROBES` points of a line decide what is around it.
+
+def rings_around(lines: Sequence[Polyline], rings: Sequence[Chain]) -> Bools:
+    """Return (n, k + 1) bool, true where a line lies inside the outline of a chain; the first column is false."""
+    points = probes_of(lines)
+    within = [enclosed(ring.outline.segments, points).reshape(-1, PROBES).all(axis=1) for ring in rings]
+    return np.stack([np.zeros(len(lines), dtype=bool), *within], axis=1)
+
+
+def turned_by_depth(nearly: Sequence[Chain], regions: Sequence[Sequence[Polyline]]) -> tuple[list[bool], list[bool]]:
+    """Say which of k chains, and which outlines of regions, must be reversed to bound something together.
+
+    A chain bounds a filled region inside an even number of others and of regions, and a hole inside an odd number. A
+    region, the inside of its outlines, is a hole inside an odd number. `PROBES` points of a line decide what is around
+    it. The second result has a value for each outline of each region, in order.
     """
-    lines = [*(chain.outline for chain in nearly), *filled]
-    places = [line.points[np.linspace(0, line.n_points - 1, PROBES).astype(np.int64)] for line in lines]
-    points = np.concatenate([np.empty((0, 2)), *places])
-    depths = enclosed(segments_of_lines(filled), points).reshape(-1, PROBES).all(axis=1).astype(np.int64)
-    depths[len(nearly) :] = 0
-    for number, chain in enumerate(nearly):
-        within = enclosed(chain.outline.segments, points).reshape(-1, PROBES).all(axis=1)
-        within[number] = False
-        depths += within
+    bodies = [*([chain.outline] for chain in nearly), *regions]
+    owner = np.repeat(np.arange(len(bodies)), [len(body) for body in bodies])
+    points = probes_of([line for body in bodies for line in body])
+    depths = np.zeros(len(owner), dtype=np.int64)
+    for number, body in enumerate(bodies):
+        within = enclosed(segments_of_lines(body), points).reshape(-1, PROBES).all(axis=1)
+        depths += within & (owner != number)
     is_hole = (depths % 2 == 1).tolist()
     turns = [(chain.outline.signed_area > 0) != hole for chain, hole in zip(nearly, is_hole, strict=False)]
     return turns, is_hole[len(nearly) :]
