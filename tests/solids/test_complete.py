@@ -771,3 +771,15 @@ def test_nested_surfaces_that_are_closed_face_as_everything_else_would_make_them
 @pytest.mark.parametrize("name", list(OTHERS))
 def test_what_is_not_closed_and_clean_is_decided(name):
     assert union.solid_as_given(OTHERS[name]) is None
+
+
+@pytest.mark.parametrize("apart", [0.0, 2e-8, 2.5e-8, 1e-7, 1e-5, 1e-3])
+@pytest.mark.parametrize("corners", [1, 3], ids=["triangles", "corners"])
+def test_loose_triangles_are_the_body_however_little_separates_them(apart, corners):
+    ball = samples.sphere(3)
+    triangles = ball.vertices[ball.faces]
+    moves = 2.0 * apart * np.random.default_rng(0).normal(size=(len(triangles), corners, 3))
+    corners_apart = (triangles + moves).reshape(-1, 3)
+    solid = sh.complete(sh.TriangleMesh(corners_apart, np.arange(len(corners_apart)).reshape(-1, 3)))
+    assert solid.volume == pytest.approx(ball.volume, rel=1e-3 + 3 * apart)
+    assert solid.distance([[0.0, 0.0, 0.0]])[0] == pytest.approx(-1.0, abs=0.01)

@@ -88,8 +88,9 @@ BYTES_PER_LOOSE_FACE, BYTES_OF_HEAT = 3400, 150_000_000
 """Peak memory per loose triangle; and memory of the grid on which loose triangles and points are completed."""
 CELLS_PER_POINT_GAP = 2.0
 """Number of grid cells between neighbouring points of a cloud."""
-NOISE_RANGE = (1e-6, 0.75)
-"""Range of distances between corners that noise has separated, relative to the square root of their triangle's area."""
+NOISE_REACH = 0.75
+"""Largest distance of corners that noise has separated, relative to the square root of their triangle's area. However
+little separates them, corners are at one place or are separated."""
 CELLS_PER_FACE = 8.0
 """Cells of the zero set of φ are at least as wide as loose faces divided by this. With 16 or 32, volumes of four soups
 of 80 to 1280 faces change by 0.02 %, and there are up to four times as many faces; with 4, by 0.16 %."""
@@ -521,7 +522,7 @@ def scatter_of(triangles: Floats, labels: Ints) -> float:
     others = owners[neighbours] != owners[:, None]
     nearest = np.where(others, near, np.inf).min(axis=1)
     sizes = np.repeat(np.sqrt(face_areas(triangles)), 3)
-    moved = (nearest > NOISE_RANGE[0] * sizes) & (nearest < NOISE_RANGE[1] * sizes)
+    moved = (nearest > 0) & (nearest < NOISE_REACH * sizes)
     if moved.mean() <= 0.5:
         return 0.0
     return max(float(np.median(nearest[moved])), float(np.median(sizes[moved])) / CELLS_PER_FACE)
