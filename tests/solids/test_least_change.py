@@ -125,6 +125,16 @@ def test_triangles_that_only_rounding_separates_are_one_body_given_twice(noise, 
     assert solid.volume == pytest.approx(1.4, rel=1e-12 + 10 * noise) and (solid.origins >= 0).all()
 
 
+@pytest.mark.parametrize(("count", "height"), [(4, 1 / 64), (8, 1 / 8)])
+def test_thin_plates_that_touch_stay_plates_without_any_one_triangle(count, height):
+    """Walls between them, divided along different diagonals, are most of their area."""
+    vertices, faces = bricks(1, 1, count, diagonals=lambda corner: sum(corner) % 2)
+    vertices = vertices * [1.5, 1.0, height]
+    for gone in range(0, len(faces), 7):
+        left = vertices, np.delete(faces, gone, axis=0)
+        assert volume(left) == pytest.approx(1.5 * height * count, rel=1e-9)
+
+
 @pytest.mark.parametrize("gap", [0.002, 0.01, 0.04])
 def test_panels_with_gaps_between_them_are_the_body(gap):
     """Octants of an ellipsoid, moved apart; each has the vertices of its own."""

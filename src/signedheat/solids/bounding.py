@@ -473,10 +473,14 @@ def _open_bounding(open_pieces: OpenPieces, soup: bool, closed: Floats, nested: 
     while alive.any():
         names, system = np.flatnonzero(alive), whole.chosen(alive)
         signs, owners = signs_of(weights[names]), names[system.owners]  # (s,) piece of each sample
-        # (s,) levels at samples, and (n,) of pieces; fixed ones within bodies have 1½, 2½, …, which count as ½
+        # (s,) levels at samples, and (n,) of pieces; fixed ones within bodies have 1½, 2½, …, which count as ½, and so
+        # do walls between touching bodies, of which one piece encloses both sides by itself
         values = system.levels(signs)
         within_body = fixed[owners] & (values > 0.5)
-        values[within_body] = 0.5 - np.abs(values[within_body] - np.floor(values[within_body]) - 0.5)
+        if within_body.any():
+            by_piece = system.levels_within(signs, np.arange(len(names)))[within_body]
+            off = np.abs(values[within_body] - np.floor(values[within_body]) - 0.5)
+            values[within_body] = np.maximum(0.5 - off, np.minimum(by_piece, 0.5))
         levels = np.zeros(n)
         levels[names] = means(values, system.owners, system.areas, len(names))
         # which pieces are bodies by themselves, alone or with their group
