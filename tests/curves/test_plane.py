@@ -502,3 +502,19 @@ def test_drawings_report_what_is_done():
     fractions = []
     sh.signed_distance(sides(0.1), resolution=24, progress=lambda fraction, _: fractions.append(fraction))
     assert len(fractions) > 3 and fractions == sorted(fractions) and fractions[-1] == 1.0
+
+
+@pytest.mark.parametrize(
+    "inner",
+    [[[0, 1], [2, 1], [2, 3], [0, 3]], [[0, 1.7], [1, 1], [2, 2], [1, 2.5]], [[1, 1], [2, 1], [2, 3], [1, 3]]],
+    ids=["shares a wall", "touches with a corner", "lies apart"],
+)
+@pytest.mark.parametrize("turn", [0.0, 0.3, 1.1, 2.2, 4.0])
+@pytest.mark.parametrize("away", [0.0, 1e6])
+def test_a_hole_that_touches_a_ring_with_a_gap_is_one_wherever_they_lie(inner, turn, away):
+    matrix = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    ring = np.array([[0.0, 2.0], [0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0], [0.0, 2.05]])
+    lines = [sh.Polyline(ring @ matrix + away), sh.Polyline(inner @ matrix + away, closed=True)]
+    points = np.array([[0.5, 0.5], [1.2, 2.0], [1.5, 2.0], [3.0, 2.0], [-0.5, 2.0]]) @ matrix + away
+    for given in (lines, lines[::-1], [line.reversed() for line in lines]):
+        assert (sh.signed_distance(given)(points) < 0).tolist() == [True, False, False, True, False]

@@ -13,7 +13,7 @@ from ..arrays import Bools, Floats, Ints
 from ..diagnostics import Note
 from ..grids.polyline import Polyline
 from ..mesh.components import connected_components, grouped
-from ..mesh.polylines import FillRule, assemble_polylines, filled_outlines
+from ..mesh.polylines import FillRule, assemble_polylines, filled_outlines, rounding_in_plane
 from ..mesh.triangles import AREA_ROUNDING
 from ..mesh.welding import ONE_PLACE
 
@@ -24,7 +24,7 @@ and as closed."""
 MOST_MEETING = 12
 """Number of ends of lines that are searched for around each other; more meet if each is near some of the others."""
 PROBES = 8
-"""Number of points of a line that must lie inside another for the line to count as inside."""
+"""Number of points of a line that tell whether it lies inside another."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,7 +63,8 @@ def outlines_filled(
     nearly = closed_together(strokes, narrow)
     # what lies inside the same rings with gaps is filled by itself: directions say nothing about anything else
     closed = [outlines[k] for k in sorted(outlines)]
-    around, group = np.unique(rings_around(closed, nearly), axis=0, return_inverse=True)
+    around = np.stack([np.zeros(len(closed), dtype=bool), *(lie_inside(closed, [c.outline]) for c in nearly)], axis=1)
+    around, group = np.unique(around, axis=0, return_inverse=True)
     regions = [region_of([closed[k] for k in np.flatnonzero(group.ravel() == g)], rule) for g in range(len(around))]
     filled = [line for region in regions for line in region]
     if nearly:
@@ -89,33 +90,35 @@ def region_of(outlines: Sequence[Polyline], rule: FillRule) -> list[Polyline]:
     return [Polyline(points, closed=True) for points in filled_outlines([line.points for line in outlines], rule)]
 
 
-def probes_of(lines: Sequence[Polyline]) -> Floats:
-    """Return `PROBES` points of each of n lines, (n * PROBES, 2)."""
-    rows = [line.points[np.linspace(0, line.n_points - 1, PROBES).astype(np.int64)] for line in lines]
-    return np.concatenate([np.empty((0, 2)), *rows])
+def lie_inside(lines: Sequence[Polyline], body: Sequence[Polyline]) -> Bools:
+    """Return (n,) whether each of n closed lines lies inside the closed lines of a body, which it may touch.
 
-
-def rings_around(lines: Sequence[Polyline], rings: Sequence[Chain]) -> Bools:
-    """Return (n, k + 1) bool, true where a line lies inside the outline of a chain; the first column is false."""
-    points = probes_of(lines)
-    within = [enclosed(ring.outline.segments, points).reshape(-1, PROBES).all(axis=1) for ring in rings]
-    return np.stack([np.zeros(len(lines), dtype=bool), *within], axis=1)
+    Of `PROBES` corners and middles of its segments, those that lie on the body, up to rounding, do not count.
+    """
+    around = segments_of_lines(body)
+    if not len(lines) or not len(around):
+        return np.zeros(len(lines), dtype=bool)
+    rows = [np.stack([s[:, 0], s.mean(axis=1)], axis=1).reshape(-1, 2) for s in (line.segments for line in lines)]
+    rows = [points[np.linspace(0, len(points) - 1, PROBES).astype(np.int64)] for points in rows]
+    points = np.concatenate(rows)
+    counts = away_from(around, points) > rounding_in_plane(np.concatenate([around, points[:, None].repeat(2, axis=1)]))
+    inside, counts = (values.reshape(-1, PROBES) for values in (enclosed(around, points), counts))
+    return np.asarray((inside | ~counts).all(axis=1) & counts.any(axis=1))
 
 
 def turned_by_depth(nearly: Sequence[Chain], regions: Sequence[Sequence[Polyline]]) -> tuple[list[bool], list[bool]]:
     """Say which of k chains, and which outlines of regions, must be reversed to bound something together.
 
     A chain bounds a filled region inside an even number of others and of regions, and a hole inside an odd number. A
-    region, the inside of its outlines, is a hole inside an odd number. `PROBES` points of a line decide what is around
-    it. The second result has a value for each outline of each region, in order.
+    region, the inside of its outlines, is a hole inside an odd number. The second result has a value for each outline
+    of each region, in order.
     """
     bodies = [*([chain.outline] for chain in nearly), *regions]
     owner = np.repeat(np.arange(len(bodies)), [len(body) for body in bodies])
-    points = probes_of([line for body in bodies for line in body])
+    lines = [line for body in bodies for line in body]
     depths = np.zeros(len(owner), dtype=np.int64)
     for number, body in enumerate(bodies):
-        within = enclosed(segments_of_lines(body), points).reshape(-1, PROBES).all(axis=1)
-        depths += within & (owner != number)
+        depths += lie_inside(lines, body) & (owner != number)
     is_hole = (depths % 2 == 1).tolist()
     turns = [(chain.outline.signed_area > 0) != hole for chain, hole in zip(nearly, is_hole, strict=False)]
     return turns, is_hole[len(nearly) :]
@@ -193,7 +196,7 @@ def chains(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
     rounding = ONE_PLACE * np.spacing(np.abs(ends).max(axis=1))
     room = np.maximum(rounding, narrow * lengths)
     nodes = meeting_places(ends, room).reshape(-1, 2)
-    runs = [(k, back) for k, back, _ in assemble_polylines(*nodes.T, directed=False)]
+    runs = [(k, back) for k, back, _ in assemble_polylines(nodes[:, 0], nodes[:, 1], directed=False)]
     between = np.array([[nodes[k[0], int(back[0])], nodes[k[-1], 1 - int(back[-1])]] for k, back in runs])
 
     def chain(halfedges: list[int], inner: list[int]) -> Chain:
@@ -218,7 +221,7 @@ def chains(strokes: dict[int, Polyline], narrow: float) -> list[Chain]:
     )
     networks = ways_round(between, angles, swept)
     in_network = {run for around, inner in networks for run in (*(h // 2 for h in around), *inner)}
-    alone = [([2 * run], []) for run in range(len(runs)) if run not in in_network]
+    alone: list[tuple[list[int], list[int]]] = [([2 * k], []) for k in range(len(runs)) if k not in in_network]
     return [chain(around, inner) for around, inner in (*networks, *alone)]
 
 
@@ -309,3 +312,16 @@ def enclosed(outlines: Floats, points: Floats) -> Bools:
         crossed = spans & ((turn > 0) == (b[:, 1] > a[:, 1])) & (turn != 0)
         inside[begin : begin + step] = crossed.sum(axis=1) % 2 == 1
     return inside
+
+
+def away_from(segments: Floats, points: Floats) -> Floats:
+    """Return (n,) distances of (n, 2) points from the nearest of (m, 2, 2) segments."""
+    a, along = segments[:, 0], segments[:, 1] - segments[:, 0]
+    squares = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+    away = np.full(len(points), np.inf)
+    step = max(1, 10**6 // max(len(segments), 1))  # a million pairs at a time
+    for begin in range(0, len(points), step):
+        off = points[begin : begin + step, None] - a
+        off -= np.clip((off * along).sum(axis=2) / squares, 0.0, 1.0)[..., None] * along
+        away[begin : begin + step] = np.sqrt((off**2).sum(axis=2).min(axis=1))
+    return away

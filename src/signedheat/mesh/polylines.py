@@ -94,7 +94,15 @@ def filled_outlines(outlines: Sequence[Floats], rule: FillRule) -> list[Floats]:
         region = manifold3d.CrossSection(scaled, manifold3d.FillRule.EvenOdd)
     else:
         region = _united(scaled)
-    return [polygon[::-1] / scale + center for polygon in region.to_polygons()]
+    polygons = [polygon[::-1] / scale + center for polygon in region.to_polygons()]
+    return [polygon for polygon in polygons if np.ptp(polygon, axis=0).any()]  # a point remains where outlines touch
+
+
+def rounding_in_plane(segments: Floats) -> float:
+    """Return the distance up to which only rounding keeps points on (m, 2, 2) segments apart."""
+    points = segments.reshape(-1, 2)
+    size, largest = float(np.ptp(points, axis=0).max(initial=0.0)), float(np.abs(points).max(initial=0.0))
+    return max(1e-12 * size, ONE_PLACE * float(np.spacing(largest)))
 
 
 def without_seams(segments: Floats) -> Floats:
@@ -104,10 +112,9 @@ def without_seams(segments: Floats) -> Floats:
     """
     # where outlines share a line, the boundary of the filled region runs along it there and back, up to rounding
     places = np.pad(segments.reshape(-1, 2), ((0, 0), (0, 1)))
-    size, largest = float(np.ptp(places, axis=0).max(initial=0.0)), float(np.abs(places).max(initial=0.0))
-    if size == 0:
+    if not np.ptp(places, axis=0).any():
         return segments
-    near = max(1e-12 * size, ONE_PLACE * float(np.spacing(largest)))
+    near = rounding_in_plane(segments)
     first, ends = np.unique(welded(places, near), return_inverse=True)
     ends = ends.reshape(-1, 2)
     # the corners that lie on each segment, in order along it
